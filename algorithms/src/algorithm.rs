@@ -1,7 +1,7 @@
-//! What a control algorithm is: from what the pre-controller has made ready to the velocity that the rod shall have.
+//! Control algorithms: from the values that the pre-controller computed to the wanted velocity of the rod.
 //!
 //! ```text
-//!   sensors, set-points ──► pre-controller ──► Ready ──► Algorithm ──► wanted rod velocity ──► post-controller ──► opening
+//!   sensors, set-points ──► pre-controller ──► AlgorithmInput ──► Algorithm ──► rod velocity ──► post-controller ──► opening
 //! ```
 //!
 //! Everything is in the axis's own extension: positions grow as its rod comes out, and a positive result extends it,
@@ -12,10 +12,11 @@
 use nominal::RigParameters;
 use settings::parameters::{Declared, Parameter};
 
-/// What the pre-controller has made ready. The C interface has the same layout: numbers of 8 bytes, in this order.
+/// Input of a control algorithm, filled in by the pre-controller. The C interface (`struct airbench_ready`) has the same layout:
+/// numbers of 8 bytes, in this order.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Ready {
+pub struct AlgorithmInput {
     /// Time between two steps of the algorithm, s.
     pub period_s: f64,
     /// Extension of the axis's rod, m.
@@ -30,7 +31,7 @@ pub struct Ready {
     pub pressure_a_pa: f64,
     /// Absolute pressure of the rod-side chamber, filtered, Pa.
     pub pressure_b_pa: f64,
-    /// Absolute pressure of the supply as the rig tells it, Pa.
+    /// Absolute pressure of the supply as the rig reports it, Pa.
     pub supply_pressure_pa: f64,
     /// Set-point of the extension, m.
     pub set_position_m: f64,
@@ -42,8 +43,8 @@ pub struct Ready {
     pub set_force_n: f64,
     /// Its rate, N/s.
     pub set_force_rate_n_per_s: f64,
-    /// What the valve could do of the last result, m/s: differs from it when the post-controller limited it. For integral parts,
-    /// which must stop where the valve stops.
+    /// The last result as the valve could apply it, m/s: differs when the post-controller limited it. For the anti-windup of
+    /// integral parts.
     pub applied_velocity_m_per_s: f64,
 }
 
@@ -53,13 +54,13 @@ pub trait Algorithm: Send {
     ///
     /// # Panics
     /// When `parameters` are not as many as its table has.
-    fn reset(&mut self, ready: &Ready, parameters: &[f64]);
+    fn reset(&mut self, input: &AlgorithmInput, parameters: &[f64]);
 
     /// The velocity that the rod shall have, m/s.
     ///
     /// # Panics
     /// When `parameters` are not as many as its table has.
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64;
+    fn step(&mut self, input: &AlgorithmInput, parameters: &[f64]) -> f64;
 }
 
 /// A control algorithm whose parameters are declared by [`settings::parameters!`] and read as fields; each is an [`Algorithm`].
@@ -68,23 +69,23 @@ pub trait ControlLaw: Send {
     type Parameters: Declared;
 
     /// Resets integral and memory, if it has any. The axis has been without control before.
-    fn reset(&mut self, _ready: &Ready, _parameters: &Self::Parameters) {}
+    fn reset(&mut self, _input: &AlgorithmInput, _parameters: &Self::Parameters) {}
 
     /// The velocity that the rod shall have, m/s.
-    fn step(&mut self, ready: &Ready, parameters: &Self::Parameters) -> f64;
+    fn step(&mut self, input: &AlgorithmInput, parameters: &Self::Parameters) -> f64;
 }
 
 impl<L: ControlLaw> Algorithm for L {
-    fn reset(&mut self, ready: &Ready, parameters: &[f64]) {
-        ControlLaw::reset(self, ready, &L::Parameters::of(parameters));
+    fn reset(&mut self, input: &AlgorithmInput, parameters: &[f64]) {
+        ControlLaw::reset(self, input, &L::Parameters::of(parameters));
     }
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        ControlLaw::step(self, ready, &L::Parameters::of(parameters))
+    fn step(&mut self, input: &AlgorithmInput, parameters: &[f64]) -> f64 {
+        ControlLaw::step(self, input, &L::Parameters::of(parameters))
     }
 }
 
-/// What an algorithm controls.
+/// Controlled quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Quantity {
@@ -114,7 +115,7 @@ pub struct Kind {
     pub name: &'static str,
     /// One sentence for lists.
     pub about: &'static str,
-    /// What it controls.
+    /// Quantity that it controls.
     pub controls: Quantity,
     /// Its parameters, in the order of the slices.
     pub parameters: &'static [Parameter],

@@ -17,7 +17,7 @@
 //!
 //! Source: [Neugebauer 2011, section 4], manual mode.
 
-use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::algorithm::{AlgorithmInput, ControlLaw, Kind, Quantity};
 use settings::parameters::declare;
 
 pub(crate) const KIND: Kind = Kind {
@@ -46,12 +46,12 @@ struct ForceManual;
 impl ControlLaw for ForceManual {
     type Parameters = Parameters;
 
-    fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
-        let error_n = ready.set_force_n - ready.force_n;
+    fn step(&mut self, input: &AlgorithmInput, parameters: &Parameters) -> f64 {
+        let error_n = input.set_force_n - input.force_n;
         let (gain, dead_n, limit) =
             (parameters.gain_m_per_n_s, parameters.dead_zone_n, parameters.limit_m_per_s);
         let wanted = if parameters.moving >= 0.5 {
-            gain * error_n + parameters.velocity_feed_forward * ready.velocity_m_per_s
+            gain * error_n + parameters.velocity_feed_forward * input.velocity_m_per_s
         } else {
             gain * (error_n - error_n.clamp(-dead_n, dead_n))
         };
@@ -73,8 +73,8 @@ mod tests {
     };
     const MOVES: Parameters = Parameters { moving: 1.0, ..STANDING };
 
-    fn at(force_n: f64, velocity_m_per_s: f64) -> Ready {
-        Ready { force_n, velocity_m_per_s, ..Ready::default() }
+    fn at(force_n: f64, velocity_m_per_s: f64) -> AlgorithmInput {
+        AlgorithmInput { force_n, velocity_m_per_s, ..AlgorithmInput::default() }
     }
 
     #[test]

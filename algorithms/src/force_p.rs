@@ -10,7 +10,7 @@
 //!
 //! Source: [Neugebauer 2011, section 4].
 
-use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
+use crate::algorithm::{AlgorithmInput, ControlLaw, Kind, LARGEST_M_PER_S, Quantity};
 use settings::parameters::declare;
 
 pub(crate) const KIND: Kind = Kind {
@@ -35,9 +35,9 @@ struct ForceP;
 impl ControlLaw for ForceP {
     type Parameters = Parameters;
 
-    fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
-        let velocity = parameters.gain_m_per_n_s * (ready.set_force_n - ready.force_n)
-            + parameters.velocity_feed_forward * ready.velocity_m_per_s;
+    fn step(&mut self, input: &AlgorithmInput, parameters: &Parameters) -> f64 {
+        let velocity = parameters.gain_m_per_n_s * (input.set_force_n - input.force_n)
+            + parameters.velocity_feed_forward * input.velocity_m_per_s;
         velocity.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S)
     }
 }
@@ -49,9 +49,14 @@ mod tests {
 
     #[test]
     fn the_error_and_the_velocity_add_up() {
-        let ready = Ready { set_force_n: 300.0, force_n: 280.0, velocity_m_per_s: -0.2, ..Ready::default() };
+        let input = AlgorithmInput {
+            set_force_n: 300.0,
+            force_n: 280.0,
+            velocity_m_per_s: -0.2,
+            ..AlgorithmInput::default()
+        };
         assert_eq!(
-            ForceP.step(&ready, &Parameters { gain_m_per_n_s: 0.01, velocity_feed_forward: 0.5 }),
+            ForceP.step(&input, &Parameters { gain_m_per_n_s: 0.01, velocity_feed_forward: 0.5 }),
             0.01 * 20.0 - 0.1
         );
     }

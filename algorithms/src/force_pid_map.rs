@@ -26,7 +26,7 @@
 //! Source: PID in the ideal form and integrator clamping [Åström, Hägglund 1995]; the map is the outlook of
 //! [Neugebauer 2011, section 5]; c from its eqs. 1 to 4.
 
-use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
+use crate::algorithm::{AlgorithmInput, ControlLaw, Kind, LARGEST_M_PER_S, Quantity};
 use crate::linearisation::Air;
 use nominal::RigParameters;
 use settings::parameters::declare;
@@ -71,7 +71,7 @@ struct ForcePidMap {
     memory: Memory,
 }
 
-/// What is remembered from step to step.
+/// State between two steps.
 #[derive(Debug, Default)]
 struct Memory {
     reference_n: f64,
@@ -96,34 +96,34 @@ impl ForcePidMap {
 impl ControlLaw for ForcePidMap {
     type Parameters = Parameters;
 
-    fn reset(&mut self, ready: &Ready, _: &Parameters) {
-        let force_n = ready.force_n;
+    fn reset(&mut self, input: &AlgorithmInput, _: &Parameters) {
+        let force_n = input.force_n;
         self.memory = Memory { reference_n: force_n, expected_n: force_n, force_n, ..Memory::default() };
     }
 
-    fn step(&mut self, ready: &Ready, p: &Parameters) -> f64 {
+    fn step(&mut self, input: &AlgorithmInput, p: &Parameters) -> f64 {
         let memory = &mut self.memory;
-        let period_s = ready.period_s;
-        let stiffness_n_per_m = self.air.at(ready).stiffness_n_per_m();
-        let moves = (2.0 * ready.velocity_m_per_s.abs() / p.standstill_m_per_s - 1.0).clamp(0.0, 1.0);
+        let period_s = input.period_s;
+        let stiffness_n_per_m = self.air.at(input).stiffness_n_per_m();
+        let moves = (2.0 * input.velocity_m_per_s.abs() / p.standstill_m_per_s - 1.0).clamp(0.0, 1.0);
 
         let fastest = p.reference_speed_m_per_s * stiffness_n_per_m;
-        let catching_up = (ready.set_force_n - memory.reference_n) / p.reference_time_s.max(period_s);
-        let reference_rate = (ready.set_force_rate_n_per_s + catching_up).clamp(-fastest, fastest);
+        let catching_up = (input.set_force_n - memory.reference_n) / p.reference_time_s.max(period_s);
+        let reference_rate = (input.set_force_rate_n_per_s + catching_up).clamp(-fastest, fastest);
         memory.reference_n += period_s * reference_rate;
         let behind_n = memory.reference_n - memory.expected_n;
         let expected_rate = behind_n / p.valve_time_s.max(period_s);
         memory.expected_n += period_s * expected_rate;
 
-        let slope = (ready.force_n - memory.force_n) / period_s;
-        memory.force_n = ready.force_n;
+        let slope = (input.force_n - memory.force_n) / period_s;
+        memory.force_n = input.force_n;
         memory.force_rate_n_per_s +=
             (1.0 - libm::exp(-TAU * p.derivative_filter_hz * period_s)) * (slope - memory.force_rate_n_per_s);
 
-        let error_n = memory.expected_n - ready.force_n;
+        let error_n = memory.expected_n - input.force_n;
         let dead_n = (1.0 - moves) * p.dead_zone_n;
         let error_n = error_n - error_n.clamp(-dead_n, dead_n);
-        let held_back = memory.result_m_per_s - ready.applied_velocity_m_per_s;
+        let held_back = memory.result_m_per_s - input.applied_velocity_m_per_s;
         if p.integral_time_s == 0.0 {
             memory.integral_n = 0.0;
         } else if held_back * error_n <= 1e-9 {
@@ -133,12 +133,12 @@ impl ControlLaw for ForcePidMap {
         memory.integral_n = memory.integral_n.clamp(-p.integral_limit_n, p.integral_limit_n);
 
         let lead_n = p.derivative_time_s * (expected_rate - memory.force_rate_n_per_s);
-        let friction_rate = moves * self.viscous_n_s_per_m * ready.acceleration_m_per_s2;
+        let friction_rate = moves * self.viscous_n_s_per_m * input.acceleration_m_per_s2;
         let force_rate = p.rate_feed_forward * reference_rate
             + p.gain_per_s * (error_n + memory.integral_n + lead_n)
             + p.friction_feed_forward * friction_rate;
         let result =
-            force_rate / stiffness_n_per_m + p.velocity_feed_forward * moves * ready.velocity_m_per_s;
+            force_rate / stiffness_n_per_m + p.velocity_feed_forward * moves * input.velocity_m_per_s;
         memory.result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         memory.result_m_per_s
     }
@@ -147,19 +147,19 @@ impl ControlLaw for ForcePidMap {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::{self, Stuck};
+    use crate::laws::{self, WindupCase};
 
     const CYCLE_S: f64 = 1e-3;
 
-    fn moving_at(velocity_m_per_s: f64) -> Ready {
-        Ready {
+    fn moving_at(velocity_m_per_s: f64) -> AlgorithmInput {
+        AlgorithmInput {
             period_s: CYCLE_S,
             position_m: 0.25,
             velocity_m_per_s,
             pressure_a_pa: 4e5,
             pressure_b_pa: 4e5,
             supply_pressure_pa: 7e5,
-            ..Ready::default()
+            ..AlgorithmInput::default()
         }
     }
 
@@ -168,19 +168,19 @@ mod tests {
         let mut parameters = Parameters::default();
         change(&mut parameters);
         let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
-        let mut ready = moving_at(-0.1);
-        let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
-        algorithm.reset(&ready, &parameters);
+        let mut input = moving_at(-0.1);
+        let stiffness = Air::new(&RigParameters::baseline()).at(&input).stiffness_n_per_m();
+        algorithm.reset(&input, &parameters);
         let mut rate = 0.0;
-        ready.set_force_n = 200.0;
+        input.set_force_n = 200.0;
         (0..1000)
             .map(|_| {
-                let result = algorithm.step(&ready, &parameters);
-                ready.applied_velocity_m_per_s = result.clamp(-0.6, 0.6);
-                let wanted = stiffness * (ready.applied_velocity_m_per_s - ready.velocity_m_per_s);
+                let result = algorithm.step(&input, &parameters);
+                input.applied_velocity_m_per_s = result.clamp(-0.6, 0.6);
+                let wanted = stiffness * (input.applied_velocity_m_per_s - input.velocity_m_per_s);
                 rate += (wanted - rate) * CYCLE_S / parameters.valve_time_s;
-                ready.force_n += CYCLE_S * rate;
-                ready.force_n
+                input.force_n += CYCLE_S * rate;
+                input.force_n
             })
             .collect()
     }
@@ -212,10 +212,10 @@ mod tests {
     #[test]
     fn a_valve_that_cannot_follow_does_not_wind_it_up() {
         // 1500 N over 100 s: 150 N in 10 s, of a limit of 500 N.
-        let changed = &[("integral_time_s", 100.0), ("integral_limit_n", 500.0)];
-        let held = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
-        let back = Ready { set_force_n: -15.0, ..moving_at(0.1) };
-        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
+        let overrides = &[("integral_time_s", 100.0), ("integral_limit_n", 500.0)];
+        let held_error = AlgorithmInput { set_force_n: 1500.0, ..moving_at(0.1) };
+        let reversed_error = AlgorithmInput { set_force_n: -15.0, ..moving_at(0.1) };
+        laws::does_not_wind_up(&KIND, &WindupCase { overrides, held_error, reversed_error });
     }
 
     #[test]
@@ -223,17 +223,17 @@ mod tests {
         let parameters = Parameters::default();
         for shut in [false, true] {
             let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
-            let mut ready = Ready { set_force_n: 1500.0, ..moving_at(0.1) };
-            algorithm.reset(&ready, &parameters);
+            let mut input = AlgorithmInput { set_force_n: 1500.0, ..moving_at(0.1) };
+            algorithm.reset(&input, &parameters);
             for _ in 0..10_000 {
-                let result = algorithm.step(&ready, &parameters);
-                ready.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
+                let result = algorithm.step(&input, &parameters);
+                input.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
             }
             // The set-point comes back below the force: the reference needs 1500 N / (v_r c), some 150 ms, and turns the result.
-            ready.set_force_n = -1500.0;
+            input.set_force_n = -1500.0;
             let turned = (0..1000).position(|_| {
-                let result = algorithm.step(&ready, &parameters);
-                ready.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
+                let result = algorithm.step(&input, &parameters);
+                input.applied_velocity_m_per_s = if shut { 0.0 } else { result.clamp(-0.6, 0.6) };
                 result < 0.0
             });
             assert!(turned.is_some_and(|cycles| cycles < 300), "{turned:?}");
@@ -244,18 +244,18 @@ mod tests {
     fn a_standing_rod_lets_small_errors_be_and_the_integral_fades() {
         let parameters = Parameters::default();
         let mut algorithm = ForcePidMap::new(&RigParameters::baseline());
-        let mut ready = Ready { force_n: 100.0, set_force_n: 104.0, ..moving_at(0.1) };
-        algorithm.reset(&ready, &parameters);
+        let mut input = AlgorithmInput { force_n: 100.0, set_force_n: 104.0, ..moving_at(0.1) };
+        algorithm.reset(&input, &parameters);
         for _ in 0..100 {
-            ready.applied_velocity_m_per_s = algorithm.step(&ready, &parameters);
+            input.applied_velocity_m_per_s = algorithm.step(&input, &parameters);
         }
         assert!(algorithm.memory.integral_n > 1.0);
-        ready.velocity_m_per_s = 0.0;
+        input.velocity_m_per_s = 0.0;
         for _ in 0..1000 {
-            ready.applied_velocity_m_per_s = algorithm.step(&ready, &parameters);
+            input.applied_velocity_m_per_s = algorithm.step(&input, &parameters);
         }
         // 1 s is twenty times the fading time, and thirty reference times.
-        assert!(ready.applied_velocity_m_per_s.abs() < 1e-6, "{}", ready.applied_velocity_m_per_s);
+        assert!(input.applied_velocity_m_per_s.abs() < 1e-6, "{}", input.applied_velocity_m_per_s);
     }
 
     #[test]

@@ -11,9 +11,9 @@
 //! A finite result of any size passes: the post-controller limits it to what the valve can do. Time is watched where it
 //! is real; a rehearsal and a run in lockstep have no clock here, so that their results do not depend on the machine.
 //! The watch sees a step only when it has returned. For one that never does, the rig shuts its valve on commands older than 20
-//! cycles, the partner misses this controller, and another thread ends the process: see [`Stuck`].
+//! cycles, the partner misses this controller, and another thread ends the process: see [`HangDetector`].
 
-use crate::algorithm::{Algorithm, Ready};
+use crate::algorithm::{Algorithm, AlgorithmInput};
 use realtime::Clock;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant as WallInstant};
@@ -25,42 +25,44 @@ pub const LONGEST_EACH: Duration = Duration::from_millis(1);
 /// How many successive steps over [`LONGEST_EACH`] are a fault.
 pub const SUCCESSIVE: u32 = 10;
 
-/// After how much wall time in one call an algorithm counts as one that never returns.
-pub const NEVER: Duration = Duration::from_secs(2);
+/// Wall time in one call after which an algorithm counts as hung.
+pub const HANG_LIMIT: Duration = Duration::from_secs(2);
 
 /// Calls of algorithms begun and ended in this process: odd while one is being called. All are called by one thread.
 static CALLS: AtomicU64 = AtomicU64::new(0);
 
-/// Looks, from another thread, for an algorithm that never returns: nothing else can end its process in good order, for the
-/// thread that would take Ctrl-C is the one that is stuck.
+/// Detects, from another thread, an algorithm that does not return. Nothing else can end its process in good order: the thread
+/// that would handle Ctrl-C is the one that hangs.
 #[derive(Debug)]
-pub struct Stuck {
-    seen: u64,
+pub struct HangDetector {
+    /// Value of [`CALLS`] in the last check.
+    calls: u64,
+    /// When the call in progress was first seen; between calls, the time of the last check.
     since: WallInstant,
 }
 
-impl Default for Stuck {
+impl Default for HangDetector {
     fn default() -> Self {
-        Self { seen: CALLS.load(Ordering::Relaxed), since: WallInstant::now() }
+        Self { calls: CALLS.load(Ordering::Relaxed), since: WallInstant::now() }
     }
 }
 
-impl Stuck {
-    /// Whether an algorithm has been in one and the same call for [`NEVER`].
-    pub fn look(&mut self) -> bool {
+impl HangDetector {
+    /// Whether an algorithm has been in one and the same call for [`HANG_LIMIT`].
+    pub fn is_hung(&mut self) -> bool {
         let calls = CALLS.load(Ordering::Relaxed);
-        if calls != self.seen || calls.is_multiple_of(2) {
-            (self.seen, self.since) = (calls, WallInstant::now());
+        if calls != self.calls || calls.is_multiple_of(2) {
+            (self.calls, self.since) = (calls, WallInstant::now());
         }
-        self.since.elapsed() > NEVER
+        self.since.elapsed() > HANG_LIMIT
     }
 }
 
 /// Message about an algorithm that does not return.
-pub const STUCK: &str = "an algorithm has not returned for 2 s; its valve is shut by the rig for want of commands. What was \
-recorded so far is saved; look for an endless loop or a wait in the step of the library";
+pub const HANG_MESSAGE: &str = "an algorithm has not returned for 2 s; its valve is shut by the rig for want of commands. \
+What was recorded so far is saved; look for an endless loop or a wait in the step of the library";
 
-/// Why an algorithm is no longer asked.
+/// Why an algorithm is no longer called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum AlgorithmFault {
     /// Its result was NaN or infinite.
@@ -74,7 +76,7 @@ pub enum AlgorithmFault {
          fewer than {SUCCESSIVE} times running"
     )]
     TooSlow {
-        /// What the call that latched took.
+        /// Duration of the call that latched it.
         took: Duration,
     },
 }
@@ -85,7 +87,7 @@ pub struct Guarded {
     clock: Option<Box<dyn Clock + Send>>,
     /// Successive steps over [`LONGEST_EACH`].
     slow: u32,
-    /// The fault since which the algorithm is not asked any more; `None` before one.
+    /// Latched fault, since which the algorithm is not called; `None` before one.
     fault: Option<AlgorithmFault>,
 }
 
@@ -96,7 +98,7 @@ impl Guarded {
         Self { algorithm, clock, slow: 0, fault: None }
     }
 
-    /// Takes the fault away: for the chain's restart and nobody else. A [`Guarded::reset`] follows before the next step.
+    /// Clears the fault; only the restart of the chain may do so. A [`Guarded::reset`] follows before the next step.
     pub fn restart(&mut self) {
         self.fault = None;
         self.slow = 0;
@@ -106,9 +108,9 @@ impl Guarded {
     ///
     /// # Errors
     /// The fault, latched before or now: the valve is to be shut.
-    pub fn reset(&mut self, ready: &Ready, parameters: &[f64]) -> Result<(), AlgorithmFault> {
-        self.unless_latched()?;
-        let ((), took) = self.timed(|algorithm| algorithm.reset(ready, parameters));
+    pub fn reset(&mut self, input: &AlgorithmInput, parameters: &[f64]) -> Result<(), AlgorithmFault> {
+        self.check_not_latched()?;
+        let ((), took) = self.timed(|algorithm| algorithm.reset(input, parameters));
         // Only too slow at once: a reset may take longer than a step.
         self.slow = 0;
         match took {
@@ -120,10 +122,10 @@ impl Guarded {
     /// The wanted velocity of the axis's rod, m/s: a finite number.
     ///
     /// # Errors
-    /// The fault, latched before or now: the valve is to be shut. The algorithm is not asked again.
-    pub fn step(&mut self, ready: &Ready, parameters: &[f64]) -> Result<f64, AlgorithmFault> {
-        self.unless_latched()?;
-        let (result, took) = self.timed(|algorithm| algorithm.step(ready, parameters));
+    /// The fault, latched before or now: the valve is to be shut. The algorithm is not called again.
+    pub fn step(&mut self, input: &AlgorithmInput, parameters: &[f64]) -> Result<f64, AlgorithmFault> {
+        self.check_not_latched()?;
+        let (result, took) = self.timed(|algorithm| algorithm.step(input, parameters));
         if !result.is_finite() {
             return Err(self.latch(AlgorithmFault::NotANumber));
         }
@@ -136,7 +138,7 @@ impl Guarded {
         Ok(result)
     }
 
-    fn unless_latched(&self) -> Result<(), AlgorithmFault> {
+    fn check_not_latched(&self) -> Result<(), AlgorithmFault> {
         self.fault.map_or(Ok(()), Err)
     }
 
@@ -164,11 +166,11 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicU64, Ordering};
 
-    /// A clock that an algorithm of the test moves on.
+    /// A clock that the algorithm of the test advances.
     #[derive(Clone, Default)]
-    struct Moved(Arc<AtomicU64>);
+    struct ManualClock(Arc<AtomicU64>);
 
-    impl Clock for Moved {
+    impl Clock for ManualClock {
         fn now(&self) -> Instant {
             Instant::from_nanos(self.0.load(Ordering::Relaxed))
         }
@@ -180,16 +182,16 @@ mod tests {
 
     /// Returns its first parameter and takes the second, ns; counts its calls.
     struct Scripted {
-        clock: Moved,
+        clock: ManualClock,
         calls: Arc<AtomicU64>,
     }
 
     impl Algorithm for Scripted {
-        fn reset(&mut self, ready: &Ready, parameters: &[f64]) {
-            self.step(ready, parameters);
+        fn reset(&mut self, input: &AlgorithmInput, parameters: &[f64]) {
+            self.step(input, parameters);
         }
 
-        fn step(&mut self, _ready: &Ready, parameters: &[f64]) -> f64 {
+        fn step(&mut self, _input: &AlgorithmInput, parameters: &[f64]) -> f64 {
             self.calls.fetch_add(1, Ordering::Relaxed);
             self.clock.0.fetch_add(parameters[1] as u64, Ordering::Relaxed);
             parameters[0]
@@ -203,14 +205,14 @@ mod tests {
 
     impl Bench {
         fn new(timed: bool) -> Self {
-            let (clock, calls) = (Moved::default(), Arc::default());
+            let (clock, calls) = (ManualClock::default(), Arc::default());
             let algorithm = Box::new(Scripted { clock: clock.clone(), calls: Arc::clone(&calls) });
             let clock: Option<Box<dyn Clock + Send>> = if timed { Some(Box::new(clock)) } else { None };
             Self { guarded: Guarded::new(algorithm, clock), calls }
         }
 
         fn step(&mut self, result: f64, took_ns: f64) -> Result<f64, AlgorithmFault> {
-            self.guarded.step(&Ready::default(), &[result, took_ns])
+            self.guarded.step(&AlgorithmInput::default(), &[result, took_ns])
         }
 
         fn calls(&self) -> u64 {
@@ -228,7 +230,7 @@ mod tests {
             assert_eq!(bench.step(bad, 0.0), Err(AlgorithmFault::NotANumber));
             assert_eq!(bench.step(0.1, 0.0), Err(AlgorithmFault::NotANumber));
             assert_eq!(
-                bench.guarded.reset(&Ready::default(), &[0.0, 0.0]),
+                bench.guarded.reset(&AlgorithmInput::default(), &[0.0, 0.0]),
                 Err(AlgorithmFault::NotANumber),
                 "a reset does not take it away"
             );
@@ -264,7 +266,7 @@ mod tests {
     #[test]
     fn a_reset_may_take_20_ms_and_no_more() {
         let mut bench = Bench::new(true);
-        let mut reset = |ms: f64| bench.guarded.reset(&Ready::default(), &[0.0, ms * MS]);
+        let mut reset = |ms: f64| bench.guarded.reset(&AlgorithmInput::default(), &[0.0, ms * MS]);
         (0..20).for_each(|_| assert_eq!(reset(19.0), Ok(())));
         assert!(matches!(reset(21.0), Err(AlgorithmFault::TooSlow { .. })));
     }

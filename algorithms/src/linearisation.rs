@@ -28,7 +28,7 @@
 //!
 //! Source: [Neugebauer 2011, eqs. 1 to 4] and its linearisation of the manipulated variable; tables of the rig file.
 
-use crate::algorithm::Ready;
+use crate::algorithm::AlgorithmInput;
 use nominal::RigParameters;
 
 /// Normal volume flow of a choked edge in m^3/h for each K_V (m^3/h) and upstream pressure (bar): [Neugebauer 2011, eq. 4].
@@ -96,36 +96,36 @@ impl Linearisation {
 
     /// The opening, -1 to 1, that moves the rod at `velocity_m_per_s`; at its limit beyond what the valve can.
     #[must_use]
-    pub fn opening(&self, velocity_m_per_s: f64, ready: &Ready) -> f64 {
+    pub fn opening(&self, velocity_m_per_s: f64, input: &AlgorithmInput) -> f64 {
         if velocity_m_per_s == 0.0 {
             return 0.0;
         }
-        let speeds = self.speeds(velocity_m_per_s < 0.0, ready);
+        let speeds = self.speeds(velocity_m_per_s < 0.0, input);
         interpolate(&speeds, &self.opening, velocity_m_per_s.abs()).copysign(velocity_m_per_s)
     }
 
     /// The velocity, m/s, that an opening stands for: the inverse of [`Self::opening`], 0 within the dead band.
     #[must_use]
-    pub fn velocity(&self, opening: f64, ready: &Ready) -> f64 {
-        let speeds = self.speeds(opening < 0.0, ready);
+    pub fn velocity(&self, opening: f64, input: &AlgorithmInput) -> f64 {
+        let speeds = self.speeds(opening < 0.0, input);
         interpolate(&self.opening, &speeds, opening.abs()).copysign(opening)
     }
 
     /// Speed at each point of the table, m/s, never falling.
-    fn speeds(&self, retracting: bool, ready: &Ready) -> [f64; POINTS] {
+    fn speeds(&self, retracting: bool, input: &AlgorithmInput) -> [f64; POINTS] {
         match self.law {
             Law::ChokedExhaust => {
                 self.kv_exhaust.map(|kv| kv / self.kv_per_velocity[usize::from(retracting)])
             }
             Law::PressureCompensated => {
-                let now = self.air.at(ready);
+                let now = self.air.at(input);
                 let [filling, emptying] = if retracting { [now.b, now.a] } else { [now.a, now.b] };
                 // Flow for each K_V, by how much force it makes in a chamber of this volume.
                 let force = |chamber: Chamber, upstream, downstream| {
                     self.normal_pressure_pa * chamber.area_m2 / chamber.volume_m3
                         * root_flow(upstream, downstream)
                 };
-                let fill = force(filling, ready.supply_pressure_pa, filling.pressure_pa);
+                let fill = force(filling, input.supply_pressure_pa, filling.pressure_pa);
                 let empty = force(emptying, emptying.pressure_pa, self.exhaust_pressure_pa);
                 let stiffness = now.stiffness_n_per_m();
                 std::array::from_fn(|i| (fill * self.kv_supply[i] + empty * self.kv_exhaust[i]) / stiffness)
@@ -198,16 +198,16 @@ impl Air {
 
     /// The chambers at measured extension and pressures; a pressure below a tenth of the atmosphere's is none that air has.
     #[must_use]
-    pub fn at(&self, ready: &Ready) -> Chambers {
-        let extension_m = ready.position_m.clamp(0.0, self.stroke_m);
+    pub fn at(&self, input: &AlgorithmInput) -> Chambers {
+        let extension_m = input.position_m.clamp(0.0, self.stroke_m);
         let chamber = |i: usize, way_m: f64, pressure_pa: f64| Chamber {
             area_m2: self.area_m2[i],
             volume_m3: self.dead_volume_m3 + self.area_m2[i] * way_m,
             pressure_pa: pressure_pa.max(self.atmospheric_pressure_pa / 10.0),
         };
         Chambers {
-            a: chamber(0, extension_m, ready.pressure_a_pa),
-            b: chamber(1, self.stroke_m - extension_m, ready.pressure_b_pa),
+            a: chamber(0, extension_m, input.pressure_a_pa),
+            b: chamber(1, self.stroke_m - extension_m, input.pressure_b_pa),
             rod_force_n: self.atmospheric_pressure_pa * (self.area_m2[0] - self.area_m2[1]),
         }
     }
@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn full_opening_is_the_choked_exhausts_velocity() {
         let linearisation = Linearisation::new(&RigParameters::baseline(), Law::ChokedExhaust);
-        let opening = |velocity| linearisation.opening(velocity, &Ready::default());
+        let opening = |velocity| linearisation.opening(velocity, &AlgorithmInput::default());
         // 12.95 * 0.58 m^3/h per bar * 1.01325 bar / 3600 / 1649.3 mm^2, computed apart.
         let largest = 12.95 * 0.58 * 1.013_25 / 3600.0 / 1.6493e-3;
         // The last step of the table rises by 0.2 of opening over 0.06 m^3/h: 1e-6 of speed is 5e-6 of opening.
@@ -262,10 +262,11 @@ mod tests {
             slow in -3.0..3.0_f64, more in 0.0..1.0_f64, position_m in -0.01..0.51_f64,
             pressure_a_pa in 0.0..1e6_f64, pressure_b_pa in 0.0..1e6_f64, supply_pressure_pa in 0.0..1e6_f64,
         ) {
-            let ready = Ready { position_m, pressure_a_pa, pressure_b_pa, supply_pressure_pa, ..Ready::default() };
+            let rest = AlgorithmInput::default();
+            let input = AlgorithmInput { position_m, pressure_a_pa, pressure_b_pa, supply_pressure_pa, ..rest };
             for law in Law::ALL {
                 let linearisation = Linearisation::new(&RigParameters::baseline(), law);
-                let (low, high) = (linearisation.opening(slow, &ready), linearisation.opening(slow + more, &ready));
+                let (low, high) = (linearisation.opening(slow, &input), linearisation.opening(slow + more, &input));
                 prop_assert!(low <= high && low >= -1.0 && high <= 1.0, "{low} {high}");
             }
         }

@@ -30,7 +30,7 @@
 //! rig-model.md.
 
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
-use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
+use crate::algorithm::{AlgorithmInput, ControlLaw, Kind, LARGEST_M_PER_S, Quantity};
 use crate::linearisation::Air;
 use crate::rest_zone::{self, RestZone};
 use nominal::RigParameters;
@@ -92,36 +92,36 @@ impl PositionCascade {
 impl ControlLaw for PositionCascade {
     type Parameters = Parameters;
 
-    fn reset(&mut self, _ready: &Ready, _: &Parameters) {
+    fn reset(&mut self, _input: &AlgorithmInput, _: &Parameters) {
         self.integral_n = 0.0;
         self.last_result_m_per_s = 0.0;
         self.rest = RestZone::default();
     }
 
-    fn step(&mut self, ready: &Ready, p: &Parameters) -> f64 {
-        let error_m = ready.set_position_m - ready.position_m;
-        if self.rest.rests(ready, p.rest_zone_m) {
+    fn step(&mut self, input: &AlgorithmInput, p: &Parameters) -> f64 {
+        let error_m = input.set_position_m - input.position_m;
+        if self.rest.rests(input, p.rest_zone_m) {
             self.last_result_m_per_s = 0.0;
             return 0.0;
         }
-        let set_acceleration = ready.set_acceleration_m_per_s2;
-        let velocity = p.gain_per_s * error_m + p.velocity_feed_forward * ready.set_velocity_m_per_s;
+        let set_acceleration = input.set_acceleration_m_per_s2;
+        let velocity = p.gain_per_s * error_m + p.velocity_feed_forward * input.set_velocity_m_per_s;
 
         // The valve gives less than was asked for: only an error that takes the integral back counts.
-        let held_back = self.last_result_m_per_s - ready.applied_velocity_m_per_s;
+        let held_back = self.last_result_m_per_s - input.applied_velocity_m_per_s;
         if error_m.abs() <= p.integral_zone_m && held_back * error_m <= 0.0 {
-            self.integral_n += p.integral_gain_n_per_m_s * error_m * ready.period_s;
+            self.integral_n += p.integral_gain_n_per_m_s * error_m * input.period_s;
         }
         self.integral_n = self.integral_n.clamp(-p.integral_limit_n, p.integral_limit_n);
 
         let sliding_n = (velocity / p.friction_speed_m_per_s).clamp(-1.0, 1.0) * self.sliding_force_n;
         let force_n = p.velocity_feed_forward * p.moved_mass_kg * set_acceleration
             + self.viscous_n_s_per_m * velocity
-            + p.velocity_gain_n_s_per_m * (velocity - ready.velocity_m_per_s)
+            + p.velocity_gain_n_s_per_m * (velocity - input.velocity_m_per_s)
             + p.friction_compensation * sliding_n
-            + p.load_compensation * ready.force_n
+            + p.load_compensation * input.force_n
             + self.integral_n;
-        let air = self.air.at(ready);
+        let air = self.air.at(input);
         let rate_n_per_s = p.force_gain_per_s * (force_n - air.force_n())
             + p.acceleration_feed_forward * self.viscous_n_s_per_m * set_acceleration;
         self.last_result_m_per_s =
@@ -133,25 +133,25 @@ impl ControlLaw for PositionCascade {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::{self, Stuck};
+    use crate::laws::{self, WindupCase};
 
     fn cascade() -> PositionCascade {
         PositionCascade::new(&RigParameters::baseline())
     }
 
     /// Air in balance at rest, as the rig starts.
-    fn balanced() -> Ready {
+    fn balanced() -> AlgorithmInput {
         let air = RigParameters::baseline();
         let (cylinder, atmosphere) = (air.cylinder(), air.supply().atmospheric_pressure_pa);
         let [a, b] = [cylinder.piston_area_m2, cylinder.annulus_area_m2];
-        Ready {
+        AlgorithmInput {
             period_s: 1e-3,
             position_m: 0.2,
             set_position_m: 0.2,
             pressure_a_pa: (3.5e5 * b + atmosphere * (a - b)) / a,
             pressure_b_pa: 3.5e5,
             supply_pressure_pa: 7e5,
-            ..Ready::default()
+            ..AlgorithmInput::default()
         }
     }
 
@@ -163,23 +163,23 @@ mod tests {
             load_compensation: 0.0,
             ..Parameters::default()
         };
-        let ready = Ready { set_position_m: 0.21, set_velocity_m_per_s: 0.1, ..balanced() };
+        let input = AlgorithmInput { set_position_m: 0.21, set_velocity_m_per_s: 0.1, ..balanced() };
         let velocity = 15.0 * 0.01 + 0.1;
-        let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
+        let stiffness = Air::new(&RigParameters::baseline()).at(&input).stiffness_n_per_m();
         let force = (1100.0 + 700.0) * velocity;
         let expected = velocity + 25.0 * force / stiffness;
-        let result = cascade().step(&ready, &parameters);
+        let result = cascade().step(&input, &parameters);
         // The balance above is computed, not measured: rounding of newtons out of some hundred.
         assert!((result - expected).abs() < 1e-9, "{result}, not {expected}");
     }
 
     #[test]
     fn the_measured_load_is_compensated() {
-        let ready = Ready { set_velocity_m_per_s: 0.1, ..balanced() };
-        let loaded = Ready { force_n: 100.0, ..ready };
-        let stiffness = Air::new(&RigParameters::baseline()).at(&ready).stiffness_n_per_m();
+        let input = AlgorithmInput { set_velocity_m_per_s: 0.1, ..balanced() };
+        let loaded = AlgorithmInput { force_n: 100.0, ..input };
+        let stiffness = Air::new(&RigParameters::baseline()).at(&input).stiffness_n_per_m();
         let more =
-            cascade().step(&loaded, &Parameters::default()) - cascade().step(&ready, &Parameters::default());
+            cascade().step(&loaded, &Parameters::default()) - cascade().step(&input, &Parameters::default());
         assert!((more - 25.0 * 100.0 / stiffness).abs() < 1e-9, "{more}");
     }
 
@@ -191,15 +191,15 @@ mod tests {
     #[test]
     fn it_does_not_wind_up() {
         // 0.2 m at 300 N/(m s): 600 N in 10 s, of a limit of 1000 N.
-        let changed = &[
+        let overrides = &[
             ("integral_gain_n_per_m_s", 300.0),
             ("integral_limit_n", 1000.0),
             ("integral_zone_m", 0.5),
             ("rest_zone_m", 0.0),
         ];
-        let held = Ready { set_position_m: 0.4, ..balanced() };
-        let back = Ready { set_position_m: 0.19, ..balanced() };
-        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
+        let held_error = AlgorithmInput { set_position_m: 0.4, ..balanced() };
+        let reversed_error = AlgorithmInput { set_position_m: 0.19, ..balanced() };
+        laws::does_not_wind_up(&KIND, &WindupCase { overrides, held_error, reversed_error });
     }
 
     #[test]

@@ -9,7 +9,7 @@
 //!
 //! Source: [Neugebauer 2011, section 4].
 
-use crate::algorithm::{ControlLaw, Kind, Quantity, Ready};
+use crate::algorithm::{AlgorithmInput, ControlLaw, Kind, Quantity};
 use crate::rest_zone::{self, RestZone};
 use settings::parameters::{Declaration, declare};
 
@@ -47,16 +47,16 @@ struct PositionP {
 impl ControlLaw for PositionP {
     type Parameters = Parameters;
 
-    fn reset(&mut self, _ready: &Ready, _: &Parameters) {
+    fn reset(&mut self, _input: &AlgorithmInput, _: &Parameters) {
         *self = Self::default();
     }
 
-    fn step(&mut self, ready: &Ready, parameters: &Parameters) -> f64 {
-        if self.rest.rests(ready, parameters.rest_zone_m) {
+    fn step(&mut self, input: &AlgorithmInput, parameters: &Parameters) -> f64 {
+        if self.rest.rests(input, parameters.rest_zone_m) {
             return 0.0;
         }
-        parameters.gain_per_s * (ready.set_position_m - ready.position_m)
-            + parameters.velocity_feed_forward * ready.set_velocity_m_per_s
+        parameters.gain_per_s * (input.set_position_m - input.position_m)
+            + parameters.velocity_feed_forward * input.set_velocity_m_per_s
     }
 }
 
@@ -66,11 +66,15 @@ mod tests {
 
     #[test]
     fn the_error_and_the_rate_add_up() {
-        let ready =
-            Ready { set_position_m: 0.2, set_velocity_m_per_s: 0.1, position_m: 0.19, ..Ready::default() };
+        let input = AlgorithmInput {
+            set_position_m: 0.2,
+            set_velocity_m_per_s: 0.1,
+            position_m: 0.19,
+            ..AlgorithmInput::default()
+        };
         assert_eq!(
             PositionP::default()
-                .step(&ready, &Parameters { gain_per_s: 40.0, velocity_feed_forward: 0.5, rest_zone_m: 0.0 }),
+                .step(&input, &Parameters { gain_per_s: 40.0, velocity_feed_forward: 0.5, rest_zone_m: 0.0 }),
             40.0 * (0.2 - 0.19) + 0.05
         );
     }

@@ -16,7 +16,7 @@
 //! Source: [Åström, Hägglund 1995], PID in the ideal form; the derivative filter is the pre-controller's.
 
 use super::position_p::{VELOCITY_FEED_FORWARD, gain};
-use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
+use crate::algorithm::{AlgorithmInput, ControlLaw, Kind, LARGEST_M_PER_S, Quantity};
 use crate::rest_zone::{self, RestZone};
 use settings::parameters::declare;
 
@@ -51,26 +51,26 @@ struct PositionPid {
 impl ControlLaw for PositionPid {
     type Parameters = Parameters;
 
-    fn reset(&mut self, _ready: &Ready, _: &Parameters) {
+    fn reset(&mut self, _input: &AlgorithmInput, _: &Parameters) {
         *self = Self::default();
     }
 
-    fn step(&mut self, ready: &Ready, p: &Parameters) -> f64 {
-        let error_m = ready.set_position_m - ready.position_m;
-        if self.rest.rests(ready, p.rest_zone_m) {
+    fn step(&mut self, input: &AlgorithmInput, p: &Parameters) -> f64 {
+        let error_m = input.set_position_m - input.position_m;
+        if self.rest.rests(input, p.rest_zone_m) {
             self.last_result_m_per_s = 0.0;
             return 0.0;
         }
-        let held_back = self.last_result_m_per_s - ready.applied_velocity_m_per_s;
+        let held_back = self.last_result_m_per_s - input.applied_velocity_m_per_s;
         if p.integral_time_s == 0.0 {
             self.integral_m = 0.0;
         } else if error_m.abs() <= p.integral_zone_m && held_back * error_m <= 0.0 {
-            self.integral_m += error_m * ready.period_s / p.integral_time_s;
+            self.integral_m += error_m * input.period_s / p.integral_time_s;
         }
         self.integral_m = self.integral_m.clamp(-p.integral_limit_m, p.integral_limit_m);
-        let rate_m_per_s = ready.set_velocity_m_per_s - ready.velocity_m_per_s;
+        let rate_m_per_s = input.set_velocity_m_per_s - input.velocity_m_per_s;
         let result = p.gain_per_s * (error_m + p.derivative_time_s * rate_m_per_s + self.integral_m)
-            + p.velocity_feed_forward * ready.set_velocity_m_per_s;
+            + p.velocity_feed_forward * input.set_velocity_m_per_s;
         self.last_result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         self.last_result_m_per_s
     }
@@ -79,12 +79,16 @@ impl ControlLaw for PositionPid {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::laws::{self, Stuck, at_rest};
+    use crate::laws::{self, WindupCase, at_rest};
 
     #[test]
     fn its_parts_add_up() {
-        let ready =
-            Ready { position_m: 0.199, velocity_m_per_s: 0.04, set_velocity_m_per_s: 0.1, ..at_rest() };
+        let input = AlgorithmInput {
+            position_m: 0.199,
+            velocity_m_per_s: 0.04,
+            set_velocity_m_per_s: 0.1,
+            ..at_rest()
+        };
         let parameters = Parameters {
             gain_per_s: 20.0,
             velocity_feed_forward: 1.0,
@@ -94,7 +98,7 @@ mod tests {
             derivative_time_s: 0.12,
             rest_zone_m: 0.0,
         };
-        let result = PositionPid::default().step(&ready, &parameters);
+        let result = PositionPid::default().step(&input, &parameters);
         let expected = 20.0 * (0.001 + 0.12 * 0.06 + 0.001 * 1e-3 / 0.5) + 0.1;
         assert!((result - expected).abs() < 1e-12, "{result}, not {expected}");
     }
@@ -107,15 +111,15 @@ mod tests {
     #[test]
     fn it_does_not_wind_up() {
         // 0.3 m over 100 s: 30 mm in 10 s, of a limit of 100 mm.
-        let changed = &[
+        let overrides = &[
             ("integral_time_s", 100.0),
             ("integral_limit_m", 0.1),
             ("integral_zone_m", 0.5),
             ("rest_zone_m", 0.0),
         ];
-        let held = Ready { set_position_m: 0.5, ..at_rest() };
-        let back = Ready { set_position_m: 0.19, ..at_rest() };
-        laws::does_not_wind_up(&KIND, &Stuck { changed, held, back });
+        let held_error = AlgorithmInput { set_position_m: 0.5, ..at_rest() };
+        let reversed_error = AlgorithmInput { set_position_m: 0.19, ..at_rest() };
+        laws::does_not_wind_up(&KIND, &WindupCase { overrides, held_error, reversed_error });
     }
 
     #[test]

@@ -12,7 +12,7 @@
 //! friction holds. The rod must stand first: shut in at a speed v, its air lets it slide on by v b / c, 0.2 mm for each
 //! mm/s in the middle of the stroke. e: error, m; b, c: viscous friction and stiffness of the air.
 
-use crate::algorithm::Ready;
+use crate::algorithm::AlgorithmInput;
 use settings::parameters::{Declaration, declare};
 
 /// A rod that leaves no band of this half-width, m, over [`STANDING_S`] stands: slower than 2 mm/s. Five times the
@@ -38,13 +38,13 @@ pub struct RestZone {
 
 impl RestZone {
     /// Whether the rod is to be left alone now; a zone of 0 never does.
-    pub fn rests(&mut self, ready: &Ready, zone_m: f64) -> bool {
-        if (ready.position_m - self.band_m).abs() > STANDING_M {
-            (self.band_m, self.stood_s) = (ready.position_m, 0.0);
+    pub fn rests(&mut self, input: &AlgorithmInput, zone_m: f64) -> bool {
+        if (input.position_m - self.band_m).abs() > STANDING_M {
+            (self.band_m, self.stood_s) = (input.position_m, 0.0);
         }
-        self.stood_s += ready.period_s;
-        let set_point_rests = ready.set_velocity_m_per_s == 0.0 && ready.set_acceleration_m_per_s2 == 0.0;
-        let error_m = (ready.set_position_m - ready.position_m).abs();
+        self.stood_s += input.period_s;
+        let set_point_rests = input.set_velocity_m_per_s == 0.0 && input.set_acceleration_m_per_s2 == 0.0;
+        let error_m = (input.set_position_m - input.position_m).abs();
         self.resting = set_point_rests
             && zone_m > 0.0
             && if self.resting {
@@ -62,10 +62,10 @@ mod tests {
 
     /// Whether the rod rests after 60 ms at `position_m`, each millisecond moved on by `drift_m`.
     fn stays(zone: &mut RestZone, position_m: f64, drift_m: f64) -> bool {
-        let at = |ms: i32| Ready {
+        let at = |ms: i32| AlgorithmInput {
             period_s: 1e-3,
             position_m: position_m + drift_m * f64::from(ms),
-            ..Ready::default()
+            ..AlgorithmInput::default()
         };
         (0..60).fold(false, |_, ms| zone.rests(&at(ms), 2e-4))
     }
@@ -89,13 +89,21 @@ mod tests {
             assert!(stays(&mut zone, 0.0, 0.0));
             zone
         };
-        assert!(!rested().rests(&Ready { set_acceleration_m_per_s2: 1e-3, ..Ready::default() }, 2e-4));
-        assert!(!rested().rests(&Ready { set_velocity_m_per_s: 1e-6, ..Ready::default() }, 2e-4));
+        assert!(
+            !rested().rests(
+                &AlgorithmInput { set_acceleration_m_per_s2: 1e-3, ..AlgorithmInput::default() },
+                2e-4
+            )
+        );
+        assert!(
+            !rested()
+                .rests(&AlgorithmInput { set_velocity_m_per_s: 1e-6, ..AlgorithmInput::default() }, 2e-4)
+        );
     }
 
     #[test]
     fn a_zone_of_nothing_never_rests() {
         let mut zone = RestZone::default();
-        assert!(stays(&mut zone, 0.0, 0.0) && !zone.rests(&Ready::default(), 0.0));
+        assert!(stays(&mut zone, 0.0, 0.0) && !zone.rests(&AlgorithmInput::default(), 0.0));
     }
 }

@@ -1,6 +1,6 @@
 //! The pressure-compensated linearisation against the plant.
 
-use algorithms::algorithm::Ready;
+use algorithms::algorithm::AlgorithmInput;
 use algorithms::linearisation::{Air, Law, Linearisation};
 use plant::{Inputs, Plant, RigParameters, Setup};
 
@@ -10,17 +10,17 @@ fn the_compensated_opening_gives_the_wanted_force_rate_of_a_held_rod() {
     let mut plant = Plant::new(&rig, &Setup { carriage_position_m: 0.2, ..Setup::default() }).unwrap();
     let inputs = Inputs::default();
     let before = plant.truth(&inputs).axes[0];
-    let ready = Ready {
+    let input = AlgorithmInput {
         position_m: before.position_m,
         pressure_a_pa: before.pressure_a_pa,
         pressure_b_pa: before.pressure_b_pa,
         supply_pressure_pa: 7e5,
-        ..Ready::default()
+        ..AlgorithmInput::default()
     };
     // Held by friction, so v = 0 and the force's rate is c times the velocity asked for: 0.5 N in a millisecond.
     let rate_n_per_s = 500.0;
-    let velocity = rate_n_per_s / Air::new(&rig).at(&ready).stiffness_n_per_m();
-    let opening = Linearisation::new(&rig, Law::PressureCompensated).opening(velocity, &ready);
+    let velocity = rate_n_per_s / Air::new(&rig).at(&input).stiffness_n_per_m();
+    let opening = Linearisation::new(&rig, Law::PressureCompensated).opening(velocity, &input);
     let opened = Inputs { valve: [plant::quantise_valve(opening), 0.0], ..inputs };
     for _ in 0..100 {
         plant.step(&opened);

@@ -1,12 +1,12 @@
 //! One axis controller: what came over the bus in, a valve command and a word for the partner out, once a cycle.
 //!
 //! ```text
-//!   hear(frame)*      partner's status and values, emergency stops, the console
-//!   answer(sensors) ─► emergency stop chain ─► main chain ─► work: what is asked ─► program: opening ─► Answer
+//!   receive(frame)*   partner's status and values, emergency stops, the console
+//!   answer(sensors) ─► emergency stop chain ─► main chain ─► request ─► program: opening ─► Answer
 //! ```
 //!
-//! Drive and load are the same code; what differs is their work (a position, a force, or nothing) and their program. They
-//! know each other through what was heard alone. Nothing here allocates, locks, prints or blocks.
+//! Drive and load are the same code; what differs is their plan (a position, a force, or nothing) and their program. They
+//! know each other through received frames alone. Nothing here allocates, locks, prints or blocks.
 
 pub(crate) mod average;
 mod by_hand;
@@ -21,13 +21,13 @@ pub use changes::PlannedChange;
 pub use record::{Answer, AxisRecord, NumberColumn, StateColumn};
 pub use work::{ForcePlan, Plan};
 
-use crate::chains::leading::{Leading, LeadingInputs};
+use crate::chains::leading::{SupervisoryChains, SupervisoryInputs};
 use crate::chains::main::{AxisMeasurement, MainCause, MainConfig, MainOutput};
 use crate::chains::settled::ControlError;
 use crate::chains::{AfterStop, Fault};
 use crate::figures::PositionFigures;
 use crate::node::NodeEvent;
-use crate::program::{Hand, Program};
+use crate::program::{ActiveAlgorithm, Program};
 use algorithms::guard::AlgorithmFault;
 use average::Average;
 use changes::Changes;
@@ -38,8 +38,8 @@ use protocol::frames::{
 };
 use range::Range;
 use received::Received;
-use slow::Slow;
-use work::{Asked, Seen, Work};
+use slow::StatusSchedule;
+use work::{ControlRequest, CycleInputs, DemandGenerator};
 
 pub struct AxisParts {
     pub axis: Axis,
@@ -57,8 +57,8 @@ pub struct AxisController {
     pub axis: Axis,
     /// Its variables may be changed between two cycles.
     pub program: Program,
-    work: Work,
-    leading: Leading,
+    demand_generator: DemandGenerator,
+    supervisory: SupervisoryChains,
     main_config: MainConfig,
     received: Received,
     changes: Changes,
@@ -67,12 +67,12 @@ pub struct AxisController {
     pub figures: PositionFigures,
     average: Average,
     range: Range,
-    /// What the rig said of itself last, however long ago.
+    /// The newest status of the rig, however old.
     rig: Option<RigStatus>,
     fault: Option<Fault>,
     algorithm_fault: Option<AlgorithmFault>,
-    asked: Option<Asked>,
-    slow: Slow,
+    request: Option<ControlRequest>,
+    status_schedule: StatusSchedule,
     alive: u8,
 }
 
@@ -81,10 +81,10 @@ impl AxisController {
         let AxisParts { axis, program, plan, main, supply_pressure_pa, changes, record_every } = parts;
         Self {
             axis,
-            work: Work::new(plan, &main),
+            demand_generator: DemandGenerator::new(plan, &main),
             changes: Changes::new(changes, &program),
             program,
-            leading: Leading::new(main.clone(), supply_pressure_pa),
+            supervisory: SupervisoryChains::new(main.clone(), supply_pressure_pa),
             received: Received::new(axis, main.experiment),
             main_config: main,
             supply_pressure_pa,
@@ -95,21 +95,21 @@ impl AxisController {
             rig: None,
             fault: None,
             algorithm_fault: None,
-            asked: None,
-            slow: Slow::new(axis),
+            request: None,
+            status_schedule: StatusSchedule::new(axis),
             alive: 0,
         }
     }
 
-    /// Takes a frame that is none of this axis's sensors and nothing of the rig's.
-    pub fn hear(&mut self, frame: &Frame) {
+    /// Processes a frame other than this axis's sensors and the rig's tick and status.
+    pub fn receive(&mut self, frame: &Frame) {
         self.received.take(frame);
     }
 
     /// The answer to the sensors of `cycle`; `rig` is the rig's status if it is fresh.
     ///
     /// A status that is no longer fresh shuts nothing: rods do not part and supplies do not change because frames are lost, and
-    /// an emergency stop comes as a frame of its own. What was said last holds; the way back from an emergency stop
+    /// an emergency stop comes as a frame of its own. The last status holds; the way back from an emergency stop
     /// waits for a fresh one.
     pub fn answer(&mut self, cycle: u64, sensors: &Sensors, rig: Option<&RigStatus>) -> Answer {
         self.rig = rig.copied().or(self.rig);
@@ -117,33 +117,39 @@ impl AxisController {
         let supply_pa = self.rig.map_or(self.supply_pressure_pa, |rig| rig.supply_pressure_pa);
         self.program.observe(cycle, sensors, supply_pa);
         self.average.take(sensors.position_m);
-        self.received.listen(cycle);
+        self.received.update_partner_age(cycle);
         let output = self.advance(cycle, rig, self.rig.map(|_| self.measurement(sensors)));
         let partner = &self.received.partner;
-        let hand = self.received.hand.take();
-        let seen = Seen { cycle, rig: self.rig.as_ref(), partner, still: self.leading.main.still(), hand };
-        self.asked = self.work.ask(&output, &seen, &mut self.program);
-        let beyond = self.range.take(self.axis, rig, output.phase);
-        self.fault = self.work.fault().or(beyond);
+        let hand_set_point = self.received.hand_set_point.take();
+        let inputs = CycleInputs {
+            cycle,
+            rig: self.rig.as_ref(),
+            partner,
+            still: self.supervisory.main.still(),
+            hand_set_point,
+        };
+        self.request = self.demand_generator.request(&output, &inputs, &mut self.program);
+        let saturation = self.range.take(self.axis, rig, output.phase);
+        self.fault = self.demand_generator.fault().or(saturation);
         if self.fault.is_some() {
-            self.asked = None;
+            self.request = None;
         }
         self.changes.follow(output.phase, &mut self.program);
         let command = self.command(cycle);
         if let Some(fault) = self.fault {
-            self.leading.stop.trip(fault, cycle);
+            self.supervisory.stop.trip(fault, cycle);
         }
         self.take_figures(&output, sensors);
         let record = cycle.is_multiple_of(self.record_every).then(|| self.record(cycle, sensors, &command));
         self.answer_with(cycle, command, record)
     }
 
-    /// What is to be said in `cycle` though no sensors of this axis came, which is a fault once it lasted.
+    /// The emergency stop to send in `cycle` when no sensors of this axis came for too long, which is a fault.
     pub fn without_sensors(&mut self, cycle: u64) -> Option<EmergencyStop> {
         self.fault = Some(Fault::SensorLoss);
         self.advance(cycle, None, None);
         self.program.shut();
-        self.leading.stop.frame_due(cycle)
+        self.supervisory.stop.frame_due(cycle)
     }
 
     fn advance(
@@ -152,12 +158,12 @@ impl AxisController {
         rig: Option<&RigStatus>,
         measurement: Option<AxisMeasurement>,
     ) -> MainOutput {
-        let before = self.leading.output.map(|output| output.state);
-        let output = self.leading.advance(&LeadingInputs {
+        let before = self.supervisory.output.map(|output| output.state);
+        let output = self.supervisory.advance(&SupervisoryInputs {
             cycle,
             rig: rig.copied(),
             measurement,
-            prepared: self.work.prepared(),
+            prepared: self.demand_generator.prepared(),
             partner: self.received.partner,
             frame: self.received.stop.take(),
             console: std::mem::take(&mut self.received.console),
@@ -171,8 +177,10 @@ impl AxisController {
     }
 
     fn measurement(&self, sensors: &Sensors) -> AxisMeasurement {
-        let error = match &self.asked {
-            Some(Asked { demand, hand: Hand::User }) => self.work.error(demand, self.program.ready()),
+        let error = match &self.request {
+            Some(ControlRequest { demand, algorithm: ActiveAlgorithm::User }) => {
+                self.demand_generator.error(demand, self.program.algorithm_input())
+            }
             _ => ControlError::None,
         };
         AxisMeasurement { position_m: sensors.position_m - self.program.geometry().offset_m, error }
@@ -186,11 +194,11 @@ impl AxisController {
             echo: (cycle % ECHO_RANGE) as u16,
             enable: false,
         };
-        let Some(Asked { demand, hand }) = &self.asked else {
+        let Some(ControlRequest { demand, algorithm }) = &self.request else {
             self.program.shut();
             return shut;
         };
-        match self.program.control(cycle, demand, *hand) {
+        match self.program.control(cycle, demand, *algorithm) {
             Ok(output) => ValveCommand { opening: output.opening, enable: true, ..shut },
             Err(fault) => {
                 self.algorithm_fault = Some(fault);
@@ -202,10 +210,11 @@ impl AxisController {
     }
 
     fn take_figures(&mut self, output: &MainOutput, sensors: &Sensors) {
-        match (&self.asked, output.state) {
-            (Some(Asked { demand, hand: Hand::User }), MainChainState::Experiment)
-                if self.work.is_position() =>
-            {
+        match (&self.request, output.state) {
+            (
+                Some(ControlRequest { demand, algorithm: ActiveAlgorithm::User }),
+                MainChainState::Experiment,
+            ) if self.demand_generator.is_position() => {
                 self.figures.take(&demand.position, sensors.position_m);
             }
             // What an emergency stop cut off is no positioning.
@@ -216,8 +225,8 @@ impl AxisController {
 
     fn answer_with(&mut self, cycle: u64, command: ValveCommand, record: Option<AxisRecord>) -> Answer {
         let status = self.status();
-        let due = self.slow.due(cycle, &status);
-        let news = due.other_state.then(|| NodeEvent::State {
+        let due = self.status_schedule.due(cycle, &status);
+        let news = due.state_changed.then(|| NodeEvent::State {
             axis: self.axis,
             state: status.main_chain,
             cycle,
@@ -225,7 +234,7 @@ impl AxisController {
         });
         Answer {
             command,
-            emergency_stop: self.leading.stop.frame_due(cycle),
+            emergency_stop: self.supervisory.stop.frame_due(cycle),
             status: due.status.then_some(status),
             values: due.values.then(|| self.values()),
             news,
@@ -236,19 +245,19 @@ impl AxisController {
     /// The rig's time began again, or it is another rig: nothing of the old one is kept. What a person has changed of the
     /// program stays.
     pub fn restart(&mut self) {
-        self.leading.restart(0);
-        self.work.restart();
+        self.supervisory.restart(0);
+        self.demand_generator.restart();
         self.changes.take_back(&mut self.program);
         self.program.restart();
         self.received = Received::new(self.axis, self.main_config.experiment);
         self.figures = PositionFigures::default();
         self.average = Average::default();
         self.range = Range::default();
-        self.slow = Slow::new(self.axis);
-        (self.rig, self.fault, self.algorithm_fault, self.asked, self.alive) = (None, None, None, None, 0);
+        self.status_schedule = StatusSchedule::new(self.axis);
+        (self.rig, self.fault, self.algorithm_fault, self.request, self.alive) = (None, None, None, None, 0);
     }
 
-    /// Why the algorithm is no longer asked.
+    /// Why the algorithm is no longer called.
     pub fn algorithm_fault(&self) -> Option<AlgorithmFault> {
         self.algorithm_fault
     }
@@ -258,7 +267,7 @@ impl AxisController {
     }
 
     pub fn cause(&self) -> MainCause {
-        self.leading.main.entered.cause
+        self.supervisory.main.entered.cause
     }
 
     pub fn may_restart(&self) -> bool {
@@ -266,12 +275,12 @@ impl AxisController {
     }
 
     pub fn emergency_stop(&self) -> EmergencyStopChainState {
-        self.leading.stop.state()
+        self.supervisory.stop.state()
     }
 
     /// How often the experiment has been driven through.
     pub fn repetitions_done(&self) -> u32 {
-        self.leading
+        self.supervisory
             .output
             .map_or(0, |output| output.repetition + u32::from(output.state == MainChainState::Done))
     }

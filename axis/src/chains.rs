@@ -90,7 +90,7 @@ pub enum AfterStop {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Entered<State, Cause> {
+pub struct StateEntry<State, Cause> {
     pub cycle: u64,
     pub state: State,
     pub cause: Cause,

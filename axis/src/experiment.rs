@@ -36,7 +36,7 @@
 
 pub mod axis;
 
-pub use axis::{AxisExperiment, ByHandLimits, Change, Prepare, ProgramReference, SetPoints};
+pub use axis::{AxisExperiment, Change, OperatorLimits, Prepare, ProgramReference, SetPoints};
 
 use crate::chains::AfterStop;
 use crate::chains::main::Start;
@@ -52,9 +52,9 @@ pub struct Experiment {
     /// Its name on the bus, 1 to 255.
     pub number: u8,
     pub run: RunSection,
-    /// What the drive does; `None`: its valve is held shut.
+    /// Experiment of the drive; `None`: its valve is held shut.
     pub drive: Option<AxisExperiment>,
-    /// What the load axis does; `None`: its valve is held shut.
+    /// Experiment of the load axis; `None`: its valve is held shut.
     pub load: Option<AxisExperiment>,
     /// Cycles between two rows of an axis's file.
     pub record_every_cycles: u32,
@@ -70,7 +70,7 @@ pub struct RunSection {
     pub settling_s: f64,
     /// How long a waiting state of the chains may take before it is given up, s.
     pub settling_timeout_s: f64,
-    /// What starts the experiment once both axes have settled.
+    /// Start condition once both axes have settled.
     pub start: Start,
     pub after_emergency_stop: AfterStop,
 }

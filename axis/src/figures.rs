@@ -8,7 +8,7 @@ use crate::axis::average::Average;
 use crate::set_point::SetPoint;
 
 #[derive(Clone, Copy, Debug, Default)]
-struct Errors {
+struct MaximumErrors {
     moving_m: Option<f64>,
     resting_m: Option<f64>,
 }
@@ -16,9 +16,9 @@ struct Errors {
 #[derive(Debug, Default)]
 pub struct PositionFigures {
     /// Of the repetitions that were driven through.
-    kept: Errors,
+    kept: MaximumErrors,
     /// Of the one that is being driven.
-    now: Errors,
+    now: MaximumErrors,
     /// |error| of the rest that is going on, m.
     resting: Average,
 }
@@ -44,7 +44,7 @@ impl PositionFigures {
 
     /// The repetition, if one is being driven, was cut off.
     pub fn drop_repetition(&mut self) {
-        self.now = Errors::default();
+        self.now = MaximumErrors::default();
         self.resting.clear();
     }
 

@@ -11,7 +11,7 @@
 use crate::axis::{Answer, AxisController, AxisRecord};
 use crate::chains::main::MainCause;
 use crate::program::Program;
-use crate::rig_view::{RigView, TickNews};
+use crate::rig_view::{RigView, TickEvent};
 use crossbeam_channel::{Receiver, Sender};
 use nominal::Axis;
 use protocol::frames::{DecodeError, EmergencyStop, Frame, MainChainState, Sensors, ValveCommand};
@@ -61,7 +61,7 @@ pub struct Change {
 }
 
 /// The queues between a node and the threads that may wait.
-pub struct Outlets {
+pub struct NodeQueues {
     /// A row of an axis each recorded cycle.
     pub records: Sender<AxisRecord>,
     pub news: Sender<NodeEvent>,
@@ -70,7 +70,7 @@ pub struct Outlets {
     pub waits: bool,
 }
 
-/// Frames between two axes of one process, each heard in the cycle after the one in which it was sent, as over the bus.
+/// Frames between two axes of one process, each received in the cycle after the one in which it was sent, as over the bus.
 #[derive(Default)]
 struct FrameDelay(VecDeque<(u64, Frame)>);
 
@@ -93,8 +93,8 @@ impl FrameDelay {
 
 struct Member<P> {
     controller: AxisController,
-    /// From the partner in this process.
-    mail: FrameDelay,
+    /// Frames of the partner in this process.
+    partner_frames: FrameDelay,
     answered: u64,
     stopped_for: u64,
     silent_ticks: u64,
@@ -128,7 +128,7 @@ impl CalibrationPort for NoPort {}
 pub struct ControllerNode<P = NoPort> {
     pub view: RigView,
     members: Vec<Member<P>>,
-    outlets: Outlets,
+    queues: NodeQueues,
     pub ignored: IgnoredFrames,
     pub records_dropped: u64,
     pub ending: bool,
@@ -139,8 +139,8 @@ pub struct ControllerNode<P = NoPort> {
 
 impl ControllerNode {
     /// Puts the controllers, one or two, on the bus.
-    pub fn new(controllers: Vec<AxisController>, outlets: Outlets) -> Self {
-        Self::with_ports(controllers, outlets, |_| None)
+    pub fn new(controllers: Vec<AxisController>, queues: NodeQueues) -> Self {
+        Self::with_ports(controllers, queues, |_| None)
     }
 }
 
@@ -148,13 +148,13 @@ impl<P: CalibrationPort> ControllerNode<P> {
     /// Puts the controllers, one or two, on the bus, each with the port that `port_of` gives for its axis.
     pub fn with_ports(
         controllers: Vec<AxisController>,
-        outlets: Outlets,
+        queues: NodeQueues,
         mut port_of: impl FnMut(Axis) -> Option<P>,
     ) -> Self {
         let member = |controller: AxisController| Member {
             port: port_of(controller.axis),
             controller,
-            mail: FrameDelay::new(),
+            partner_frames: FrameDelay::new(),
             answered: 0,
             stopped_for: 0,
             silent_ticks: 0,
@@ -162,7 +162,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         Self {
             view: RigView::default(),
             members: controllers.into_iter().map(member).collect(),
-            outlets,
+            queues,
             ignored: IgnoredFrames::default(),
             records_dropped: 0,
             ending: false,
@@ -181,21 +181,21 @@ impl<P: CalibrationPort> ControllerNode<P> {
             Ok(Frame::LoadSensors(sensors)) => return Some(self.take_sensors(Axis::Load, sensors)),
             Ok(Frame::RigStatus(status)) => self.view.take_status(status),
             Ok(Frame::Tick(tick)) => match self.view.take_tick(&tick) {
-                TickNews::Usual => self.members.iter_mut().for_each(|member| member.silent_ticks += 1),
-                TickNews::Ending => self.ending = true,
-                TickNews::Restarted => {
+                TickEvent::Usual => self.members.iter_mut().for_each(|member| member.silent_ticks += 1),
+                TickEvent::Ending => self.ending = true,
+                TickEvent::Restarted => {
                     self.ending = false;
                     self.newest_answered = None;
                     self.members.iter_mut().for_each(|member| {
                         member.controller.restart();
-                        member.mail.0.clear();
+                        member.partner_frames.0.clear();
                         member.silent_ticks = 0;
                         member.port.iter_mut().for_each(CalibrationPort::restart);
                     });
-                    self.tell(NodeEvent::RigRestarted);
+                    self.report(NodeEvent::RigRestarted);
                 }
             },
-            Ok(frame) => self.members.iter_mut().for_each(|member| member.controller.hear(&frame)),
+            Ok(frame) => self.members.iter_mut().for_each(|member| member.controller.receive(&frame)),
             Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
                 self.ignored.unknown += 1;
             }
@@ -221,8 +221,8 @@ impl<P: CalibrationPort> ControllerNode<P> {
             if let Some((cycle, sensors)) = self.view.fresh_sensors(axis) {
                 let status = self.view.status().copied();
                 let member = &mut self.members[place];
-                while let Some(frame) = member.mail.received_in(cycle) {
-                    member.controller.hear(&frame);
+                while let Some(frame) = member.partner_frames.received_in(cycle) {
+                    member.controller.receive(&frame);
                 }
                 let answer = member.controller.answer(cycle, &sensors, status.as_ref());
                 member.answered += 1;
@@ -234,7 +234,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
                 self.send(place, cycle, &answer, bus);
                 answered[axis.index()] = Some((cycle, sensors, answer.command));
             } else if self.members[place].silent_ticks >= SILENT_TICKS {
-                self.speak_without_sensors(place, bus);
+                self.report_missing_sensors(place, bus);
             }
         }
         // When all valves have their commands.
@@ -263,7 +263,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// The rig goes on, and sensors of the axis do not come: after each tick the axis says what a fault has to say.
-    fn speak_without_sensors(&mut self, place: usize, bus: &mut dyn FrameSink) {
+    fn report_missing_sensors(&mut self, place: usize, bus: &mut dyn FrameSink) {
         let Some(cycle) = self.view.cycle else { return };
         let member = &mut self.members[place];
         if member.answered == 0 {
@@ -283,7 +283,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
     fn send_to_all(&mut self, place: usize, cycle: u64, frame: &Frame, bus: &mut dyn FrameSink) {
         send(bus, frame);
         self.members.iter_mut().enumerate().filter(|(other, _)| *other != place).for_each(|(_, member)| {
-            member.mail.post(cycle, as_received(frame));
+            member.partner_frames.post(cycle, as_received(frame));
         });
     }
 
@@ -303,20 +303,20 @@ impl<P: CalibrationPort> ControllerNode<P> {
             self.send_to_all(place, cycle, &frame, bus);
         }
         if let Some(news) = answer.news {
-            self.tell(news);
+            self.report(news);
         }
         if let Some(record) = answer.record {
-            let sent = if self.outlets.waits {
-                self.outlets.records.send(record).is_ok()
+            let sent = if self.queues.waits {
+                self.queues.records.send(record).is_ok()
             } else {
-                self.outlets.records.try_send(record).is_ok()
+                self.queues.records.try_send(record).is_ok()
             };
             self.records_dropped += u64::from(!sent);
         }
     }
 
     fn take_changes(&mut self) {
-        while let Ok(change) = self.outlets.changes.try_recv() {
+        while let Ok(change) = self.queues.changes.try_recv() {
             let of_axis = |member: &&mut Member<P>| member.controller.axis == change.axis;
             let Some(member) = self.members.iter_mut().find(of_axis) else { continue };
             // Checked by whoever sent it.
@@ -325,8 +325,8 @@ impl<P: CalibrationPort> ControllerNode<P> {
     }
 
     /// Tells a person something; a full queue loses it, which a person survives.
-    pub fn tell(&mut self, news: NodeEvent) {
-        let _ = self.outlets.news.try_send(news);
+    pub fn report(&mut self, news: NodeEvent) {
+        let _ = self.queues.news.try_send(news);
     }
 
     pub fn controllers(&self) -> impl Iterator<Item = &AxisController> {
@@ -388,19 +388,20 @@ mod tests {
 
     #[test]
     fn mail_is_heard_in_the_cycle_after_it_was_sent() {
-        let mut mail = FrameDelay::new();
+        let mut partner_frames = FrameDelay::new();
         let frame = Frame::DriveChainStatus(ChainStatus::default());
-        mail.post(7, frame);
-        assert!(mail.received_in(7).is_none());
-        mail.post(8, frame);
-        assert!(mail.received_in(8).is_some() && mail.received_in(8).is_none());
-        assert!(mail.received_in(9).is_some());
+        partner_frames.post(7, frame);
+        assert!(partner_frames.received_in(7).is_none());
+        partner_frames.post(8, frame);
+        assert!(partner_frames.received_in(8).is_some() && partner_frames.received_in(8).is_none());
+        assert!(partner_frames.received_in(9).is_some());
     }
 
     #[test]
     fn a_partner_that_is_not_heard_for_long_leaves_the_newest() {
-        let mut mail = FrameDelay::new();
-        (0..100).for_each(|cycle| mail.post(cycle, Frame::DriveChainStatus(ChainStatus::default())));
-        assert_eq!((0..200).filter(|_| mail.received_in(1000).is_some()).count(), DELAYED_FRAMES);
+        let mut partner_frames = FrameDelay::new();
+        (0..100)
+            .for_each(|cycle| partner_frames.post(cycle, Frame::DriveChainStatus(ChainStatus::default())));
+        assert_eq!((0..200).filter(|_| partner_frames.received_in(1000).is_some()).count(), DELAYED_FRAMES);
     }
 }

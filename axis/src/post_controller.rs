@@ -7,7 +7,7 @@
 //! The dead zone shuts the valve for wanted velocities below it and opens it again from one and a half times of it on, so
 //! that noise at its edge does not let the valve chatter.
 
-use algorithms::algorithm::Ready;
+use algorithms::algorithm::AlgorithmInput;
 use algorithms::linearisation::Linearisation;
 use settings::parameters::declare;
 
@@ -48,9 +48,9 @@ impl PostController {
     }
 
     /// Turns a finite wanted velocity into an opening.
-    pub fn step(&mut self, wanted_m_per_s: f64, ready: &Ready, parameters: &Parameters) -> Output {
+    pub fn step(&mut self, wanted_m_per_s: f64, input: &AlgorithmInput, parameters: &Parameters) -> Output {
         if parameters.manual >= 0.5 {
-            return self.output(parameters.manual_opening, ready);
+            return self.output(parameters.manual_opening, input);
         }
         let dead_zone = parameters.dead_zone_m_per_s * if self.shut { 1.0 + HYSTERESIS } else { 1.0 };
         self.shut = wanted_m_per_s.abs() < dead_zone;
@@ -58,16 +58,16 @@ impl PostController {
             return Output::default();
         }
         let limit = parameters.opening_limit;
-        let opening = self.linearisation.opening(wanted_m_per_s, ready);
+        let opening = self.linearisation.opening(wanted_m_per_s, input);
         if opening.abs() <= limit {
-            let most = self.linearisation.velocity(opening, ready).abs();
+            let most = self.linearisation.velocity(opening, input).abs();
             return Output { opening, applied_velocity_m_per_s: wanted_m_per_s.clamp(-most, most) };
         }
-        self.output(opening.clamp(-limit, limit), ready)
+        self.output(opening.clamp(-limit, limit), input)
     }
 
-    fn output(&self, opening: f64, ready: &Ready) -> Output {
-        Output { opening, applied_velocity_m_per_s: self.linearisation.velocity(opening, ready) }
+    fn output(&self, opening: f64, input: &AlgorithmInput) -> Output {
+        Output { opening, applied_velocity_m_per_s: self.linearisation.velocity(opening, input) }
     }
 }
 
@@ -89,14 +89,18 @@ mod tests {
         for (wanted, open) in
             [(0.009, false), (0.014, false), (0.016, true), (0.011, true), (0.009, false), (0.011, false)]
         {
-            assert_eq!(post.step(wanted, &Ready::default(), &parameters).opening != 0.0, open, "{wanted}");
+            assert_eq!(
+                post.step(wanted, &AlgorithmInput::default(), &parameters).opening != 0.0,
+                open,
+                "{wanted}"
+            );
         }
     }
 
     #[test]
     fn manual_mode_overrides() {
         let parameters = Parameters { manual: 1.0, manual_opening: 0.25, ..Parameters::default() };
-        let output = post().step(-3.0, &Ready::default(), &parameters);
+        let output = post().step(-3.0, &AlgorithmInput::default(), &parameters);
         assert!(output.opening == 0.25 && output.applied_velocity_m_per_s > 0.0);
     }
 
@@ -107,7 +111,7 @@ mod tests {
         ) {
             let parameters =
                 Parameters { opening_limit: limit, dead_zone_m_per_s: dead_zone, ..Parameters::default() };
-            let output = post().step(wanted, &Ready::default(), &parameters);
+            let output = post().step(wanted, &AlgorithmInput::default(), &parameters);
             prop_assert!(output.opening.abs() <= limit);
             prop_assert!(output.applied_velocity_m_per_s.abs() <= wanted.abs() + 1e-12);
             prop_assert!(output.opening * wanted >= 0.0);

@@ -10,7 +10,7 @@
 //!
 //! T is the time between the two samples that there are: cycles that the rig skipped pass for the filters too.
 
-use algorithms::algorithm::Ready;
+use algorithms::algorithm::AlgorithmInput;
 use nominal::Axis;
 use protocol::frames::Sensors;
 use settings::parameters::declare;
@@ -30,7 +30,7 @@ settings::parameters! {
 pub struct Geometry {
     axis: Axis,
     stroke_m: f64,
-    /// What the position sensor reads too much, as far as it is known, m.
+    /// Known offset of the position sensor, m: reading less position.
     pub offset_m: f64,
 }
 
@@ -65,7 +65,7 @@ impl Geometry {
 
 #[derive(Clone, Copy, Debug, Default)]
 struct LowPass {
-    /// What `share` was computed for.
+    /// Cut-off frequency and period that `share` was computed for.
     cut_off_hz: f64,
     period_s: f64,
     share: f64,
@@ -77,12 +77,12 @@ impl LowPass {
         Self { value, ..Self::default() }
     }
 
-    fn step(&mut self, input: f64, cut_off_hz: f64, period_s: f64) -> f64 {
+    fn step(&mut self, sample: f64, cut_off_hz: f64, period_s: f64) -> f64 {
         if cut_off_hz != self.cut_off_hz || period_s != self.period_s {
             self.share = 1.0 - libm::exp(-TAU * cut_off_hz * period_s);
             (self.cut_off_hz, self.period_s) = (cut_off_hz, period_s);
         }
-        self.value += self.share * (input - self.value);
+        self.value += self.share * (sample - self.value);
         self.value
     }
 }
@@ -127,8 +127,14 @@ impl PreController {
         self.geometry.offset_m = 0.0;
     }
 
-    /// Takes the sensors that came `period_s` after the last ones, and fills in what was measured of `ready`.
-    pub fn step(&mut self, sensors: &Sensors, period_s: f64, parameters: &Parameters, ready: &mut Ready) {
+    /// Takes the sensors that came `period_s` after the last ones, and fills in what was measured of `input`.
+    pub fn step(
+        &mut self,
+        sensors: &Sensors,
+        period_s: f64,
+        parameters: &Parameters,
+        input: &mut AlgorithmInput,
+    ) {
         let extension_m = self.geometry.extension_m(sensors.position_m - self.geometry.offset_m);
         let memory = self.memory.get_or_insert_with(|| Memory {
             extension_m,
@@ -141,21 +147,21 @@ impl PreController {
         let slope = (extension_m - std::mem::replace(&mut memory.extension_m, extension_m)) / period_s;
         let velocity = twice(&mut memory.velocity, slope, parameters.velocity_filter_hz, period_s);
         let slope = (velocity - last_velocity) / period_s;
-        ready.position_m = extension_m;
-        ready.velocity_m_per_s = velocity;
-        ready.acceleration_m_per_s2 =
+        input.position_m = extension_m;
+        input.velocity_m_per_s = velocity;
+        input.acceleration_m_per_s2 =
             twice(&mut memory.acceleration, slope, parameters.acceleration_filter_hz, period_s);
-        ready.force_n = memory.force.step(sensors.force_n, parameters.force_filter_hz, period_s);
+        input.force_n = memory.force.step(sensors.force_n, parameters.force_filter_hz, period_s);
         let pressure_hz = parameters.pressure_filter_hz;
         let [a, b] = &mut memory.pressures;
-        ready.pressure_a_pa = a.step(sensors.pressure_a_pa, pressure_hz, period_s);
-        ready.pressure_b_pa = b.step(sensors.pressure_b_pa, pressure_hz, period_s);
+        input.pressure_a_pa = a.step(sensors.pressure_a_pa, pressure_hz, period_s);
+        input.pressure_b_pa = b.step(sensors.pressure_b_pa, pressure_hz, period_s);
     }
 }
 
-fn twice(filters: &mut [LowPass; 2], input: f64, cut_off_hz: f64, period_s: f64) -> f64 {
+fn twice(filters: &mut [LowPass; 2], sample: f64, cut_off_hz: f64, period_s: f64) -> f64 {
     let [first, second] = filters;
-    second.step(first.step(input, cut_off_hz, period_s), cut_off_hz, period_s)
+    second.step(first.step(sample, cut_off_hz, period_s), cut_off_hz, period_s)
 }
 
 #[cfg(test)]
@@ -170,33 +176,33 @@ mod tests {
     fn a_steady_motion_has_its_velocity_and_no_acceleration() {
         for (axis, direction) in [(Axis::Drive, 1.0), (Axis::Load, -1.0)] {
             let mut pre = PreController::new(Geometry::new(axis, 0.5));
-            let mut ready = Ready::default();
+            let mut input = AlgorithmInput::default();
             (0..1000).for_each(|ms| {
-                pre.step(&at(0.1 + 0.2 * f64::from(ms) * 1e-3), 1e-3, &Parameters::default(), &mut ready);
+                pre.step(&at(0.1 + 0.2 * f64::from(ms) * 1e-3), 1e-3, &Parameters::default(), &mut input);
             });
             // 1 s is 190 time constants of the slowest filter.
-            assert!((ready.velocity_m_per_s - direction * 0.2).abs() < 1e-9, "{axis:?}");
-            assert!(ready.acceleration_m_per_s2.abs() < 1e-6, "{axis:?}");
+            assert!((input.velocity_m_per_s - direction * 0.2).abs() < 1e-9, "{axis:?}");
+            assert!(input.acceleration_m_per_s2.abs() < 1e-6, "{axis:?}");
         }
     }
 
     #[test]
     fn the_first_sample_is_taken_at_its_word() {
         let mut pre = PreController::new(Geometry::new(Axis::Drive, 0.5));
-        let mut ready = Ready::default();
+        let mut input = AlgorithmInput::default();
         let sensors = Sensors { position_m: 0.3, force_n: 50.0, pressure_a_pa: 4e5, ..Sensors::default() };
-        pre.step(&sensors, 1e-3, &Parameters::default(), &mut ready);
-        assert_eq!((ready.position_m, ready.velocity_m_per_s), (0.3, 0.0));
-        assert_eq!((ready.force_n, ready.pressure_a_pa), (50.0, 4e5));
+        pre.step(&sensors, 1e-3, &Parameters::default(), &mut input);
+        assert_eq!((input.position_m, input.velocity_m_per_s), (0.3, 0.0));
+        assert_eq!((input.force_n, input.pressure_a_pa), (50.0, 4e5));
     }
 
     #[test]
     fn another_offset_makes_no_velocity() {
         let mut pre = PreController::new(Geometry::new(Axis::Load, 0.5));
-        let mut ready = Ready::default();
-        pre.step(&at(0.3), 1e-3, &Parameters::default(), &mut ready);
+        let mut input = AlgorithmInput::default();
+        pre.step(&at(0.3), 1e-3, &Parameters::default(), &mut input);
         pre.set_offset(0.8e-3);
-        pre.step(&at(0.3), 1e-3, &Parameters::default(), &mut ready);
-        assert!(ready.velocity_m_per_s.abs() < 1e-12 && (ready.position_m - 0.2008).abs() < 1e-12);
+        pre.step(&at(0.3), 1e-3, &Parameters::default(), &mut input);
+        assert!(input.velocity_m_per_s.abs() < 1e-12 && (input.position_m - 0.2008).abs() < 1e-12);
     }
 }

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! The algorithm is one of [`algorithms`] or a shared library; a second one, with a multiple of its own, may be there for
-//! the force chain, which relieves the linked system and gives way to a hand. Every number is a [`Variable`], those of the chains
+//! the force chain, which relieves the linked system and yields to a hand. Every number is a [`Variable`], those of the chains
 //! too: it has a name such as `algorithm.gain_per_s` and may change between two cycles.
 //!
 //! [`mod@file`] reads the file.
@@ -18,7 +18,7 @@ use crate::chains::force::ForceOutput;
 use crate::post_controller::{self, Output, PostController};
 use crate::pre_controller::{self, Geometry, PreController};
 use crate::set_point::{Actual, ForceSetPoint, SetPoint};
-use algorithms::algorithm::{Quantity, Ready};
+use algorithms::algorithm::{AlgorithmInput, Quantity};
 use algorithms::guard::{AlgorithmFault, Guarded};
 use protocol::frames::Sensors;
 use protocol::periods::CYCLE_S;
@@ -39,25 +39,27 @@ pub struct Variable {
     pub parameter: Parameter,
 }
 
-/// What the axis shall do in a cycle, in rig coordinates; an algorithm looks at what it controls.
+/// Set-points of a cycle, in rig coordinates; an algorithm uses that of the quantity which it controls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
     pub position: SetPoint,
     pub force: ForceSetPoint,
 }
 
+/// Which algorithm of the program controls the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hand {
+pub enum ActiveAlgorithm {
     User,
     ForceChain,
 }
 
-struct Slot {
+/// An algorithm of the program, with its values and its last step.
+struct AlgorithmSlot {
     algorithm: Guarded,
     controls: Quantity,
     values: Range<usize>,
     /// Cycle of its last step; `None` when it must begin anew.
-    stepped: Option<u64>,
+    stepped_cycle: Option<u64>,
     wanted_m_per_s: f64,
 }
 
@@ -68,33 +70,33 @@ pub enum Task {
     PostController,
     ForceChain,
     MatchingChain,
-    /// What counts as settled; read once, at the start.
+    /// Bounds of a settled axis; read once, at the start.
     Settled,
 }
 
-/// The algorithm that the force chain uses, and the two of its values in which the chain has a say each cycle.
-struct GivingWay {
-    slot: Slot,
-    /// Places among the slot's values.
-    moving: usize,
-    limit_m_per_s: usize,
-    /// What the chain decided last: whether the rod moves, and its limit, m/s.
-    decided: (bool, Option<f64>),
-    /// The slot's values with that in them; the user's own stay what they are.
+/// The algorithm that the force chain uses, and the two of its values that the chain sets each cycle.
+struct ForceChainSlot {
+    slot: AlgorithmSlot,
+    /// Indices among the slot's values.
+    moving_index: usize,
+    limit_index: usize,
+    /// The chain's last output: whether the rod moves, and its limit, m/s.
+    chain_output: (bool, Option<f64>),
+    /// The slot's values with the chain's output in place; the user's values do not change.
     effective: Vec<f64>,
 }
 
 pub struct Program {
     pre: PreController,
     post: PostController,
-    user: Slot,
-    giving_way: Option<GivingWay>,
+    user_slot: AlgorithmSlot,
+    force_chain_slot: Option<ForceChainSlot>,
     variables: Vec<Variable>,
     values: Vec<f64>,
     tasks: [Range<usize>; 5],
-    ready: Ready,
-    observed: Option<u64>,
-    post_stepped: Option<u64>,
+    input: AlgorithmInput,
+    observed_cycle: Option<u64>,
+    post_stepped_cycle: Option<u64>,
     output: Output,
 }
 
@@ -102,7 +104,7 @@ impl Program {
     /// Takes the sensors of `cycle`: the pre-controller's task.
     pub fn observe(&mut self, cycle: u64, sensors: &Sensors, supply_pressure_pa: f64) {
         let parameters = pre_controller::Parameters::of(self.task(Task::PreController));
-        let passed = match due(self.observed, cycle, parameters.every_cycles) {
+        let passed = match due(self.observed_cycle, cycle, parameters.every_cycles) {
             Due::NotYet => return,
             Due::After(passed) => passed,
             Due::Anew => {
@@ -110,52 +112,57 @@ impl Program {
                 parameters.every_cycles
             }
         };
-        self.observed = Some(cycle);
-        self.ready.supply_pressure_pa = supply_pressure_pa;
-        self.pre.step(sensors, passed * CYCLE_S, &parameters, &mut self.ready);
+        self.observed_cycle = Some(cycle);
+        self.input.supply_pressure_pa = supply_pressure_pa;
+        self.pre.step(sensors, passed * CYCLE_S, &parameters, &mut self.input);
     }
 
-    /// The opening for `demand`, from the algorithm that has the axis.
+    /// The opening for `demand`, from the active algorithm.
     ///
     /// # Errors
     /// [`AlgorithmFault`], latched until [`Program::restart_algorithms`]: the valve is to be shut.
-    pub fn control(&mut self, cycle: u64, demand: &Demand, hand: Hand) -> Result<Output, AlgorithmFault> {
+    pub fn control(
+        &mut self,
+        cycle: u64,
+        demand: &Demand,
+        algorithm: ActiveAlgorithm,
+    ) -> Result<Output, AlgorithmFault> {
         let geometry = &self.pre.geometry;
         let direction = geometry.direction();
-        let ready = &mut self.ready;
-        ready.set_position_m = geometry.extension_m(demand.position.position_m);
-        ready.set_velocity_m_per_s = direction * demand.position.velocity_m_per_s;
-        ready.set_acceleration_m_per_s2 = direction * demand.position.acceleration_m_per_s2;
-        ready.set_force_n = demand.force.force_n;
-        ready.set_force_rate_n_per_s = demand.force.rate_n_per_s;
-        let wanted = match (hand, &mut self.giving_way) {
-            (Hand::ForceChain, Some(giving_way)) => {
-                self.user.stepped = None;
-                giving_way.step(cycle, ready, &self.values)?
+        let input = &mut self.input;
+        input.set_position_m = geometry.extension_m(demand.position.position_m);
+        input.set_velocity_m_per_s = direction * demand.position.velocity_m_per_s;
+        input.set_acceleration_m_per_s2 = direction * demand.position.acceleration_m_per_s2;
+        input.set_force_n = demand.force.force_n;
+        input.set_force_rate_n_per_s = demand.force.rate_n_per_s;
+        let wanted = match (algorithm, &mut self.force_chain_slot) {
+            (ActiveAlgorithm::ForceChain, Some(force_chain)) => {
+                self.user_slot.stepped_cycle = None;
+                force_chain.step(cycle, input, &self.values)?
             }
             (_, other) => {
-                if let Some(giving_way) = other {
-                    giving_way.slot.stepped = None;
+                if let Some(force_chain) = other {
+                    force_chain.slot.stepped_cycle = None;
                 }
-                self.user.step(cycle, ready, &self.values[self.user.values.clone()])?
+                self.user_slot.step(cycle, input, &self.values[self.user_slot.values.clone()])?
             }
         };
         let parameters =
             post_controller::Parameters::of(&self.values[self.tasks[Task::PostController as usize].clone()]);
-        if due(self.post_stepped, cycle, parameters.every_cycles) != Due::NotYet {
-            self.post_stepped = Some(cycle);
-            self.output = self.post.step(wanted, ready, &parameters);
-            self.ready.applied_velocity_m_per_s = self.output.applied_velocity_m_per_s;
+        if due(self.post_stepped_cycle, cycle, parameters.every_cycles) != Due::NotYet {
+            self.post_stepped_cycle = Some(cycle);
+            self.output = self.post.step(wanted, input, &parameters);
+            self.input.applied_velocity_m_per_s = self.output.applied_velocity_m_per_s;
         }
         Ok(self.output)
     }
 
-    /// The valve is shut: whatever has the axis next begins anew.
+    /// The valve is shut: the next active algorithm is reset first.
     pub fn shut(&mut self) {
-        self.slots().for_each(|slot| slot.stepped = None);
-        self.post_stepped = None;
+        self.slots().for_each(|slot| slot.stepped_cycle = None);
+        self.post_stepped_cycle = None;
         self.output = Output::default();
-        self.ready.applied_velocity_m_per_s = 0.0;
+        self.input.applied_velocity_m_per_s = 0.0;
     }
 
     /// The rig's time began again, or it is another rig: nothing that was seen holds, the matched offset no more than the rest.
@@ -165,29 +172,29 @@ impl Program {
         self.slots().for_each(|slot| slot.wanted_m_per_s = 0.0);
         self.pre.restart();
         self.post.restart();
-        self.ready = Ready::default();
-        self.observed = None;
+        self.input = AlgorithmInput::default();
+        self.observed_cycle = None;
     }
 
-    /// Takes latched faults away: the chain begins anew.
+    /// Clears latched faults: the chain begins anew.
     pub fn restart_algorithms(&mut self) {
         self.slots().for_each(|slot| slot.algorithm.restart());
     }
 
-    fn slots(&mut self) -> impl Iterator<Item = &mut Slot> {
-        std::iter::once(&mut self.user)
-            .chain(self.giving_way.iter_mut().map(|giving_way| &mut giving_way.slot))
+    fn slots(&mut self) -> impl Iterator<Item = &mut AlgorithmSlot> {
+        std::iter::once(&mut self.user_slot)
+            .chain(self.force_chain_slot.iter_mut().map(|force_chain| &mut force_chain.slot))
     }
 
-    /// Tells the algorithm of the force chain what the chain has decided.
-    pub fn give_way(&mut self, chain: &ForceOutput) {
-        if let Some(giving_way) = &mut self.giving_way {
-            giving_way.decided = (chain.feed_forward, chain.limit_m_per_s);
+    /// Passes the output of the force chain to its algorithm.
+    pub fn set_chain_output(&mut self, chain: &ForceOutput) {
+        if let Some(force_chain) = &mut self.force_chain_slot {
+            force_chain.chain_output = (chain.feed_forward, chain.limit_m_per_s);
         }
     }
 
-    pub fn gives_way(&self) -> bool {
-        self.giving_way.is_some()
+    pub fn has_force_chain_slot(&self) -> bool {
+        self.force_chain_slot.is_some()
     }
 
     /// Values of a task, in the order of its table.
@@ -197,43 +204,43 @@ impl Program {
 
     /// Position of the axis, less the sensor's offset, m, rig coordinates.
     pub fn position_m(&self) -> f64 {
-        self.pre.geometry.position_m(self.ready.position_m)
+        self.pre.geometry.position_m(self.input.position_m)
     }
 
-    /// What the axis does, in rig coordinates.
+    /// Measured motion of the axis, in rig coordinates.
     pub fn actual(&self) -> Actual {
         let direction = self.pre.geometry.direction();
         Actual {
             position_m: self.position_m(),
-            velocity_m_per_s: direction * self.ready.velocity_m_per_s,
-            acceleration_m_per_s2: direction * self.ready.acceleration_m_per_s2,
+            velocity_m_per_s: direction * self.input.velocity_m_per_s,
+            acceleration_m_per_s2: direction * self.input.acceleration_m_per_s2,
         }
     }
 
-    /// What was measured, in the axis's own extension.
-    pub fn ready(&self) -> &Ready {
-        &self.ready
+    /// Input of the algorithms, in the axis's own extension.
+    pub fn algorithm_input(&self) -> &AlgorithmInput {
+        &self.input
     }
 
     pub fn geometry(&self) -> &Geometry {
         &self.pre.geometry
     }
 
-    /// Takes what the position sensor reads too much, m.
+    /// Sets the offset of the position sensor, m.
     pub fn set_offset(&mut self, offset_m: f64) {
         self.pre.set_offset(offset_m);
     }
 
     /// The velocity that the algorithm wants, m/s, along the axis's extension.
-    pub fn wanted_m_per_s(&self, hand: Hand) -> f64 {
-        match (hand, &self.giving_way) {
-            (Hand::ForceChain, Some(giving_way)) => giving_way.slot.wanted_m_per_s,
-            _ => self.user.wanted_m_per_s,
+    pub fn wanted_m_per_s(&self, algorithm: ActiveAlgorithm) -> f64 {
+        match (algorithm, &self.force_chain_slot) {
+            (ActiveAlgorithm::ForceChain, Some(force_chain)) => force_chain.slot.wanted_m_per_s,
+            _ => self.user_slot.wanted_m_per_s,
         }
     }
 
     pub fn controls(&self) -> Quantity {
-        self.user.controls
+        self.user_slot.controls
     }
 
     /// All variables, in the order of their values.
@@ -260,34 +267,44 @@ impl Program {
     }
 }
 
-impl Slot {
+impl AlgorithmSlot {
     /// The wanted velocity, with the `values` of this slot.
-    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<f64, AlgorithmFault> {
+    fn step(
+        &mut self,
+        cycle: u64,
+        input: &mut AlgorithmInput,
+        values: &[f64],
+    ) -> Result<f64, AlgorithmFault> {
         let (every, parameters) = values.split_at(1);
-        match due(self.stepped, cycle, every[0]) {
+        match due(self.stepped_cycle, cycle, every[0]) {
             Due::NotYet => return Ok(self.wanted_m_per_s),
-            Due::After(passed) => ready.period_s = passed * CYCLE_S,
+            Due::After(passed) => input.period_s = passed * CYCLE_S,
             Due::Anew => {
-                ready.period_s = every[0] * CYCLE_S;
-                self.algorithm.reset(ready, parameters)?;
+                input.period_s = every[0] * CYCLE_S;
+                self.algorithm.reset(input, parameters)?;
             }
         }
-        self.stepped = Some(cycle);
+        self.stepped_cycle = Some(cycle);
         self.wanted_m_per_s = 0.0;
-        self.wanted_m_per_s = self.algorithm.step(ready, parameters)?;
+        self.wanted_m_per_s = self.algorithm.step(input, parameters)?;
         Ok(self.wanted_m_per_s)
     }
 }
 
-impl GivingWay {
-    /// The wanted velocity: the chain says whether the rod moves, and the lower one of its limit and the user's holds.
-    fn step(&mut self, cycle: u64, ready: &mut Ready, values: &[f64]) -> Result<f64, AlgorithmFault> {
-        let (moves, limit_m_per_s) = self.decided;
+impl ForceChainSlot {
+    /// The wanted velocity: the chain sets whether the rod moves, and the lower of its limit and the user's applies.
+    fn step(
+        &mut self,
+        cycle: u64,
+        input: &mut AlgorithmInput,
+        values: &[f64],
+    ) -> Result<f64, AlgorithmFault> {
+        let (moves, limit_m_per_s) = self.chain_output;
         self.effective.copy_from_slice(&values[self.slot.values.clone()]);
-        self.effective[self.moving] = f64::from(u8::from(moves));
-        let limit = &mut self.effective[self.limit_m_per_s];
+        self.effective[self.moving_index] = f64::from(u8::from(moves));
+        let limit = &mut self.effective[self.limit_index];
         *limit = limit.min(limit_m_per_s.unwrap_or(f64::INFINITY));
-        self.slot.step(cycle, ready, &self.effective)
+        self.slot.step(cycle, input, &self.effective)
     }
 }
 

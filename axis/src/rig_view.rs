@@ -1,4 +1,4 @@
-//! What the controller knows of the rig, from frames alone: sensors, cycle number, frames that never came.
+//! View of the rig from its frames alone: sensors, cycle number, lost frames.
 //!
 //! The sensors carry the low 4 bits of their cycle, the tick all of them every ten cycles and whenever cycles were
 //! skipped. Together they give the cycle of each frame, which a command echoes and which is the experiment's time.
@@ -17,7 +17,7 @@ mod recent;
 
 use nominal::Axis;
 use protocol::frames::{ALIVE_RANGE, RigStatus, Sensors, Tick};
-use recent::{Coming, Recent};
+use recent::{RecentSensors, SensorArrival};
 
 /// Cycles for which a status of the rig holds: ten of its periods.
 const STATUS_HOLDS_CYCLES: u64 = 100;
@@ -47,7 +47,7 @@ impl PerAxis {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TickNews {
+pub enum TickEvent {
     Usual,
     /// The rig is another one, or the same started anew: its cycles begin again.
     Restarted,
@@ -58,7 +58,7 @@ pub enum TickNews {
 /// arbitration.
 const MOST_PASSED: u64 = 3;
 
-/// What a tick says about frames sent, with counters unwrapped.
+/// Frames sent and received by a tick, with counters unwrapped.
 #[derive(Clone, Copy)]
 struct Account {
     sent: u64,
@@ -73,7 +73,7 @@ pub struct RigView {
     pub cycle: Option<u64>,
     pub skipped: u64,
     sensors: [Option<Sensors>; 2],
-    recent: [Recent; 2],
+    recent: [RecentSensors; 2],
     /// Cycle of the newest sensors of each axis.
     newest: [Option<u64>; 2],
     fresh: [bool; 2],
@@ -95,12 +95,12 @@ impl RigView {
     pub fn take_sensors(&mut self, axis: Axis, sensors: Sensors) {
         *self.received.of(axis) += 1;
         match self.recent[axis.index()].take(&sensors) {
-            Coming::Newer => {}
-            Coming::Late => {
+            SensorArrival::Newer => {}
+            SensorArrival::Late => {
                 *self.late.of(axis) += 1;
                 return;
             }
-            Coming::Again => {
+            SensorArrival::Duplicate => {
                 *self.duplicate.of(axis) += 1;
                 return;
             }
@@ -120,7 +120,7 @@ impl RigView {
         self.fresh[axis.index()] = true;
     }
 
-    pub fn take_tick(&mut self, tick: &Tick) -> TickNews {
+    pub fn take_tick(&mut self, tick: &Tick) -> TickEvent {
         // The tick's counter wraps after 49.7 days, ours does not: what counts is the way from the cycle that we know.
         let ahead = self.cycle.map(|known| i64::from(tick.cycle.wrapping_sub(known as u32).cast_signed()));
         // Sensors that follow a lost tick may have brought us one round of their counter ahead.
@@ -141,9 +141,9 @@ impl RigView {
         }
         self.cycle = Some(cycle);
         match (restarted, tick.ending) {
-            (true, _) => TickNews::Restarted,
-            (_, true) => TickNews::Ending,
-            _ => TickNews::Usual,
+            (true, _) => TickEvent::Restarted,
+            (_, true) => TickEvent::Ending,
+            _ => TickEvent::Usual,
         }
     }
 
@@ -193,7 +193,7 @@ impl RigView {
         Some((cycle.saturating_sub(behind), sensors))
     }
 
-    /// What the rig says of itself; `None` until it said something, and when that is older than 100 cycles.
+    /// Status of the rig; `None` before the first, and when it is older than 100 cycles.
     ///
     /// Cycles that the rig skipped make it older too: after those it is the next status that counts. What an axis does while
     /// there is none stands in [`AxisController::answer`](crate::axis::AxisController::answer).

@@ -20,11 +20,11 @@ pub mod step;
 pub mod table;
 pub mod trapezoidal;
 
-pub use bestehorn::SmoothWay;
+pub use bestehorn::SmoothTransition;
 pub use force::{ForceProfile, ForceSource};
 
-use law::{Law, Moment};
-use row::{Place, Row};
+use law::{Law, ProfilePoint};
+use row::{Row, RowPosition};
 use std::sync::Arc;
 
 /// A position set-point with its derivatives, in rig coordinates.
@@ -43,14 +43,14 @@ impl SetPoint {
     }
 }
 
-impl From<Moment> for SetPoint {
-    fn from(moment: Moment) -> Self {
-        let Moment { value, rate, acceleration, moving } = moment;
+impl From<ProfilePoint> for SetPoint {
+    fn from(point: ProfilePoint) -> Self {
+        let ProfilePoint { value, rate, acceleration, moving } = point;
         Self { position_m: value, velocity_m_per_s: rate, acceleration_m_per_s2: acceleration, moving }
     }
 }
 
-impl From<SetPoint> for Moment {
+impl From<SetPoint> for ProfilePoint {
     fn from(point: SetPoint) -> Self {
         let SetPoint { position_m, velocity_m_per_s, acceleration_m_per_s2, moving } = point;
         Self { value: position_m, rate: velocity_m_per_s, acceleration: acceleration_m_per_s2, moving }
@@ -71,19 +71,19 @@ impl ForceSetPoint {
     }
 }
 
-impl From<Moment> for ForceSetPoint {
-    fn from(moment: Moment) -> Self {
-        Self { force_n: moment.value, rate_n_per_s: moment.rate, moving: moment.moving }
+impl From<ProfilePoint> for ForceSetPoint {
+    fn from(point: ProfilePoint) -> Self {
+        Self { force_n: point.value, rate_n_per_s: point.rate, moving: point.moving }
     }
 }
 
-impl From<ForceSetPoint> for Moment {
+impl From<ForceSetPoint> for ProfilePoint {
     fn from(point: ForceSetPoint) -> Self {
         Self { value: point.force_n, rate: point.rate_n_per_s, acceleration: 0.0, moving: point.moving }
     }
 }
 
-/// What the axis does, measured and filtered, in rig coordinates.
+/// Measured and filtered motion of the axis, in rig coordinates.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Actual {
     pub position_m: f64,
@@ -100,12 +100,12 @@ pub struct Motion {
 impl Motion {
     /// The set-point `time_s` after the start: the start before it, the end from the end on.
     pub fn at(&self, time_s: f64) -> SetPoint {
-        let moment = match self.row.place(time_s) {
-            Place::Before => Moment::at_rest(self.start_m()),
-            Place::In { segment, since_s, .. } => segment.at(since_s),
-            Place::Behind => Moment::at_rest(self.end_m()),
+        let point = match self.row.locate(time_s) {
+            RowPosition::Before => ProfilePoint::at_rest(self.start_m()),
+            RowPosition::In { segment, since_s, .. } => segment.at(since_s),
+            RowPosition::After => ProfilePoint::at_rest(self.end_m()),
         };
-        moment.into()
+        point.into()
     }
 
     pub fn duration_s(&self) -> f64 {

@@ -248,7 +248,7 @@ impl Inputs {
             )));
         }
         // An axis that presses gives way too: on linked rods while the drive is positioned, to relieve stress, to a hand.
-        if asked == Quantity::Position || program.gives_way() {
+        if asked == Quantity::Position || program.has_force_chain_slot() {
             return Ok(());
         }
         let source = self.programs[axis.index()].as_ref();

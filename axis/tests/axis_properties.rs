@@ -1,5 +1,5 @@
-//! Axis controllers under anything that a bus can say: sensors that jump, a rig that trips, a partner that lies, a console that
-//! shouts, parameters at the ends of their ranges. On the virtual clock: time is the number of the cycle.
+//! Axis controllers under random inputs: sensors that jump, a rig that trips, a partner with any status, console commands,
+//! parameters at the ends of their ranges. On the virtual clock: time is the number of the cycle.
 //!
 //! Whatever comes, the opening is a number within the valve, and the valve is shut in every state that has no control.
 
@@ -39,7 +39,7 @@ fn controller(axis: Axis, program: &str) -> AxisController {
 }
 
 #[derive(Clone, Debug)]
-enum Happening {
+enum Stimulus {
     Nothing,
     Rig(RigStatus),
     Partner(ChainStatus, ChainValues),
@@ -66,9 +66,9 @@ fn main_state() -> impl Strategy<Value = MainChainState> {
     (0..10_u8).prop_map(|raw| MainChainState::from_raw(raw).expect("there are ten"))
 }
 
-fn happening() -> impl Strategy<Value = Happening> {
+fn stimulus() -> impl Strategy<Value = Stimulus> {
     let rig = (0.0..=1e6_f64, any::<[bool; 3]>()).prop_map(|(supply_pressure_pa, [linked, stop, shut])| {
-        Happening::Rig(RigStatus {
+        Stimulus::Rig(RigStatus {
             supply_pressure_pa,
             linked,
             emergency_stop: stop,
@@ -79,7 +79,7 @@ fn happening() -> impl Strategy<Value = Happening> {
     let partner = (main_state(), any::<bool>(), 0..4_u8, 0.0..=0.5_f64).prop_map(
         |(main_chain, ok, repetition, averaged_position_m)| {
             let status = ChainStatus { main_chain, ok, repetition, experiment: 9, ..ChainStatus::default() };
-            Happening::Partner(status, ChainValues { averaged_position_m, ..ChainValues::default() })
+            Stimulus::Partner(status, ChainValues { averaged_position_m, ..ChainValues::default() })
         },
     );
     let stop =
@@ -95,14 +95,14 @@ fn happening() -> impl Strategy<Value = Happening> {
         Frame::RunControl(RunControl { command, experiment: 0 })
     });
     prop_oneof![
-        20 => Just(Happening::Nothing),
+        20 => Just(Stimulus::Nothing),
         4 => rig,
         8 => partner,
-        1 => stops.prop_map(Happening::Stop),
-        1 => console.prop_map(Happening::Console),
-        4 => (0..100_usize, 0.0..=1.0_f64).prop_map(|(place, share)| Happening::Parameter(place, share)),
-        1 => (1..2000_u64).prop_map(Happening::Skipped),
-        1 => Just(Happening::Restart),
+        1 => stops.prop_map(Stimulus::Stop),
+        1 => console.prop_map(Stimulus::Console),
+        4 => (0..100_usize, 0.0..=1.0_f64).prop_map(|(place, share)| Stimulus::Parameter(place, share)),
+        1 => (1..2000_u64).prop_map(Stimulus::Skipped),
+        1 => Just(Stimulus::Restart),
     ]
 }
 
@@ -110,7 +110,7 @@ fn happening() -> impl Strategy<Value = Happening> {
 fn echo_partner(controller: &mut AxisController, answer: &Answer) {
     let Some(status) = answer.status else { return };
     let status = ChainStatus { ok: true, ..status };
-    controller.hear(&match controller.axis {
+    controller.receive(&match controller.axis {
         Axis::Drive => Frame::LoadChainStatus(status),
         Axis::Load => Frame::DriveChainStatus(status),
     });
@@ -138,27 +138,27 @@ fn check(answer: &Answer, controller: &AxisController) -> Result<(), TestCaseErr
 
 fn drive_through(
     mut controller: AxisController,
-    course: &[(Sensors, Happening)],
+    course: &[(Sensors, Stimulus)],
     goes_along: bool,
 ) -> Result<(), TestCaseError> {
     let mut cycle = 0;
     let mut rig = Some(RigStatus { supply_pressure_pa: 7e5, linked: true, ..RigStatus::default() });
-    for (sensors, happening) in course {
-        match happening {
-            Happening::Nothing => {}
-            Happening::Rig(status) => rig = Some(*status),
-            Happening::Partner(status, values) => {
+    for (sensors, stimulus) in course {
+        match stimulus {
+            Stimulus::Nothing => {}
+            Stimulus::Rig(status) => rig = Some(*status),
+            Stimulus::Partner(status, values) => {
                 for axis_frame in [
                     Frame::DriveChainStatus(*status),
                     Frame::LoadChainStatus(*status),
                     Frame::DriveChainValues(*values),
                     Frame::LoadChainValues(*values),
                 ] {
-                    controller.hear(&axis_frame);
+                    controller.receive(&axis_frame);
                 }
             }
-            Happening::Stop(frame) | Happening::Console(frame) => controller.hear(frame),
-            Happening::Parameter(place, share) => {
+            Stimulus::Stop(frame) | Stimulus::Console(frame) => controller.receive(frame),
+            Stimulus::Parameter(place, share) => {
                 let program = &mut controller.program;
                 let place = place % program.variables().len();
                 let parameter = &program.variables()[place].parameter;
@@ -166,8 +166,8 @@ fn drive_through(
                 let value = if parameter.whole { value.round() } else { value };
                 prop_assert!(program.set(place, value).is_ok());
             }
-            Happening::Skipped(cycles) => cycle += cycles,
-            Happening::Restart => {
+            Stimulus::Skipped(cycles) => cycle += cycles,
+            Stimulus::Restart => {
                 controller.restart();
                 (cycle, rig) = (0, None);
             }
@@ -194,7 +194,7 @@ proptest! {
     fn a_position_axis_keeps_its_valve_in_range_and_shut_without_control(
         program in prop::sample::select(programs(Quantity::Position)),
         goes_along in any::<bool>(),
-        course in prop::collection::vec((sensors(), happening()), 1..120),
+        course in prop::collection::vec((sensors(), stimulus()), 1..120),
     ) {
         drive_through(controller(Axis::Drive, &program), &course, goes_along)?;
     }
@@ -203,7 +203,7 @@ proptest! {
     fn a_force_axis_keeps_its_valve_in_range_and_shut_without_control(
         program in prop::sample::select(programs(Quantity::Force)),
         goes_along in any::<bool>(),
-        course in prop::collection::vec((sensors(), happening()), 1..120),
+        course in prop::collection::vec((sensors(), stimulus()), 1..120),
     ) {
         drive_through(controller(Axis::Load, &program), &course, goes_along)?;
     }

@@ -62,7 +62,7 @@ fn step(controller: &mut AxisController, cycle: u64, sensors: &Sensors, rig: Opt
             Axis::Drive => [Frame::LoadChainStatus(status), Frame::LoadChainValues(values)],
             Axis::Load => [Frame::DriveChainStatus(status), Frame::DriveChainValues(values)],
         };
-        frames.iter().for_each(|frame| controller.hear(frame));
+        frames.iter().for_each(|frame| controller.receive(frame));
     }
     answer
 }
@@ -95,7 +95,7 @@ fn a_settling_timeout_alone_is_released_by_the_console_and_the_run_begins_anew()
         if passed == 2000 {
             assert_eq!(drive.emergency_stop(), EmergencyStopChainState::WaitingForRelease);
             let reason = EmergencyStopReason::Operator;
-            drive.hear(&Frame::ConsoleEmergencyStop(EmergencyStop { reason, release: true }));
+            drive.receive(&Frame::ConsoleEmergencyStop(EmergencyStop { reason, release: true }));
         }
         let rig = RigStatus { emergency_stop: holds, check_valves_shut: holds, ..linked() };
         let answer = drive.answer(cycle + passed, &far(cycle), Some(&rig));

@@ -20,7 +20,7 @@ fn answer(drive: &mut AxisController, cycle: u64) -> Answer {
 fn speak(drive: &mut AxisController) {
     let main_chain = drive.state();
     let status = ChainStatus { main_chain, ok: true, experiment: NUMBER, ..ChainStatus::default() };
-    drive.hear(&Frame::LoadChainStatus(status));
+    drive.receive(&Frame::LoadChainStatus(status));
 }
 
 /// Positioned on its way, in the cycle after which nothing was heard of the partner any more.

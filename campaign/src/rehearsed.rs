@@ -19,7 +19,7 @@ use plant::tables::{self, CycleRecord};
 use plant::{Axis, Truth};
 use protocol::frames::MainChainState;
 use protocol::periods::CYCLE_S;
-use rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
+use rehearsal::{Rehearsal, RehearsalParts, RehearsalRow};
 use std::collections::BTreeMap;
 
 /// Rehearses a run of at most `seconds` of the rig's time.
@@ -65,7 +65,7 @@ fn outcome(rehearsal: &Rehearsal, record: &Record, inputs: &Inputs) -> Result<Ou
     // The axis with the fault before one that only followed it.
     let stopped =
         controllers().filter(is_stopped).max_by_key(|controller| controller.state() == MainChainState::Fault);
-    let broken = rehearsal.off_the_wire().map(|error| format!("the simulated rig broke: {error}"));
+    let broken = rehearsal.encode_error().map(|error| format!("the simulated rig broke: {error}"));
     let (ended, because) = match stopped {
         _ if broken.is_some() => (EndState::Failed, broken.unwrap_or_default()),
         Some(axis) => (EndState::Stopped, format!("{}: {}", axis.axis.name(), axis.cause())),
@@ -132,7 +132,7 @@ impl Columns {
         }
     }
 
-    fn push(&mut self, rehearsed: &Rehearsed) {
+    fn push(&mut self, rehearsed: &RehearsalRow) {
         let CycleRecord { cycle, truth, .. } = &rehearsed.cycle;
         // The double next to the decimal number that a table has.
         let time_s = *cycle as f64 / 1000.0;

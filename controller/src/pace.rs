@@ -26,7 +26,7 @@ const LONGEST_DRAIN: Duration = Duration::from_millis(300);
 const WARM_UP: u64 = 1000;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum End {
+pub(crate) enum RunEnd {
     /// The rig announced its end, or was silent after Done.
     RigEnded,
     Interrupted,
@@ -47,7 +47,7 @@ pub(crate) struct RunContext<'a> {
 }
 
 pub(crate) struct RunOutcome {
-    pub(crate) end: End,
+    pub(crate) end: RunEnd,
     /// Allocations in the 1 ms path after warm-up; `None` without the counting allocator, and for a run shorter than the
     /// warm-up.
     pub(crate) allocations: Option<u64>,
@@ -83,10 +83,10 @@ pub(crate) fn run_real(
         let answered = node.answer(&mut stopwatch.bus(bus));
         stopwatch.answered(answered, || vitals.read());
         if interrupt.came() {
-            break End::Interrupted;
+            break RunEnd::Interrupted;
         }
         if node.ending {
-            break End::RigEnded;
+            break RunEnd::RigEnded;
         }
         ever_up |= bus.is_up();
         // Both events, after a stall in which the bus went and returned.
@@ -94,21 +94,21 @@ pub(crate) fn run_real(
         let went = times_gone != std::mem::replace(&mut disconnects, times_gone);
         if went && ever_up && was_up {
             was_up = false;
-            node.tell(NodeEvent::BusLost);
+            node.report(NodeEvent::BusLost);
         }
         if ever_up && bus.is_up() != was_up {
             was_up = bus.is_up();
-            node.tell(if was_up { NodeEvent::BusBack } else { NodeEvent::BusLost });
+            node.report(if was_up { NodeEvent::BusBack } else { NodeEvent::BusLost });
         }
         let quiet = rig.silence(node);
         if node.stopped_for() > STOPPED_CYCLES {
-            break End::Stopped;
+            break RunEnd::Stopped;
         }
         if quiet > DONE_SILENCE && node.done() {
-            break End::RigEnded;
+            break RunEnd::RigEnded;
         }
         if quiet > grace {
-            break End::BusGone;
+            break RunEnd::BusGone;
         }
     };
     let allocations = watch.map(|watch| {
@@ -165,7 +165,7 @@ impl RigActivity {
         if (quiet > SILENCE) != self.silent {
             self.silent = !self.silent;
             if self.silent {
-                node.tell(NodeEvent::SensorsSilent);
+                node.report(NodeEvent::SensorsSilent);
             }
         }
         quiet
@@ -186,30 +186,30 @@ pub(crate) fn run_lockstep(context: RunContext<'_>, name: &str) -> Result<RunOut
                     waiting_since = None;
                     // Checked here, since the queue of a running rig is never empty.
                     if interrupt.came() {
-                        break End::Interrupted;
+                        break RunEnd::Interrupted;
                     }
                     if node.ending {
-                        break End::RigEnded;
+                        break RunEnd::RigEnded;
                     }
                     node.answer(bus);
                     bus.done(control.cycle);
                     if node.stopped_for() > STOPPED_CYCLES {
-                        break End::Stopped;
+                        break RunEnd::Stopped;
                     }
                 }
-                Kind::TimedOut => break End::LockstepTimeout,
+                Kind::TimedOut => break RunEnd::LockstepTimeout,
                 _ => {}
             },
             Received::Nothing => {
                 if interrupt.came() {
-                    break End::Interrupted;
+                    break RunEnd::Interrupted;
                 }
                 // Without its host the bus has no rig, and simulated time ends.
                 let since = *waiting_since.get_or_insert_with(WallInstant::now);
                 if bus.counters().disconnects > 0 || since.elapsed() > grace {
                     // The last tick may be lost on the wire; a rig that leaves when all is done has ended.
                     let ended = node.ending || node.done();
-                    break if ended { End::RigEnded } else { End::BusGone };
+                    break if ended { RunEnd::RigEnded } else { RunEnd::BusGone };
                 }
                 bus.wait_readable(Duration::from_millis(100));
             }

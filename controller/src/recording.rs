@@ -5,7 +5,7 @@
 use crate::reload::Reloader;
 use crate::report::axis_of;
 use crate::timing::queues::TimingQueues;
-use algorithms::guard::Stuck;
+use algorithms::guard::HangDetector;
 use axis_control::axis::AxisRecord;
 use axis_control::node::NodeEvent;
 use crossbeam_channel::{Receiver, TryRecvError};
@@ -87,13 +87,13 @@ pub(crate) struct WriterResult {
 
 impl Writer {
     /// Writes rows and prints events until the senders are gone. `failed` is called when nothing can be written any more;
-    /// `stuck`, which does not return, when an algorithm does not return, after everything was written.
-    pub(crate) fn run(self, failed: impl Fn(), stuck: impl Fn()) -> WriterResult {
+    /// `hung`, which does not return, when an algorithm does not return, after everything was written.
+    pub(crate) fn run(self, failed: impl Fn(), hung: impl Fn()) -> WriterResult {
         let Self { mut tables, records, news, mut reloader, mut parameter_files, mut timing } = self;
         let mut reported = Vec::new();
         let mut last_flush = Instant::now();
         let mut failure: Option<String> = None;
-        let mut watch = Stuck::default();
+        let mut detector = HangDetector::default();
         loop {
             let mut finished = false;
             // At most the rows that wait now, so that events are not delayed where rows arrive faster than they are written.
@@ -120,11 +120,11 @@ impl Writer {
             if let Some(timing) = &mut timing {
                 note(&mut failure, if finished { timing.finish() } else { timing.poll() });
             }
-            if watch.look() {
+            if detector.is_hung() {
                 // The process ends here, so that a failure of the last write cannot be reported.
                 let _ = tables.write_out();
                 let _ = timing.as_mut().map(TimingQueues::finish);
-                stuck();
+                hung();
             }
             if finished || last_flush.elapsed() > FLUSH_PERIOD {
                 last_flush = Instant::now();

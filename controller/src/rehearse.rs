@@ -6,7 +6,7 @@ use crate::cli::RehearseArguments;
 use crate::recording::{Tables, sentence};
 use crate::report::{self, Report};
 use crate::run::RunError;
-use algorithms::guard::{STUCK, Stuck};
+use algorithms::guard::{HANG_MESSAGE, HangDetector};
 use axis_control::node::NodeEvent;
 use axis_control::setup::Inputs;
 use nominal::Axis;
@@ -42,7 +42,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
         .and_then(|()| clear_results(out))
         .and_then(|()| clear_timing(out))
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
-    end_when_stuck();
+    end_when_hung();
     let started = Instant::now();
     let mut files = PlantTables::create(out, &scene, &rehearsal).map_err(RunError::output)?;
     let mut axes = Tables::create(out, &Axis::ALL).map_err(RunError::output)?;
@@ -62,7 +62,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
         interrupted = interrupt.came();
     }
     files.write_out().and_then(|()| axes.write_out()).map_err(RunError::output)?;
-    if let Some(error) = rehearsal.off_the_wire() {
+    if let Some(error) = rehearsal.encode_error() {
         let cycle = rehearsal.cycles();
         return Err(RunError::Input(format!(
             "the simulated rig broke in cycle {cycle}: {error}; its file makes it so"
@@ -85,13 +85,13 @@ fn clear_timing(out: &Path) -> std::io::Result<()> {
 }
 
 /// Ends the process when an algorithm does not return and blocks its thread.
-fn end_when_stuck() {
+fn end_when_hung() {
     std::thread::spawn(|| {
-        let mut watch = Stuck::default();
-        while !watch.look() {
+        let mut detector = HangDetector::default();
+        while !detector.is_hung() {
             std::thread::sleep(Duration::from_millis(100));
         }
-        protocol::say!("controller: {STUCK}");
+        protocol::say!("controller: {HANG_MESSAGE}");
         std::process::exit(Exit::BoundBroken as i32);
     });
 }

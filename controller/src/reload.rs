@@ -62,7 +62,7 @@ impl Reloader {
 
 impl ProgramFile {
     fn new(source: &Source, axis: Axis, rig: &RigParameters) -> Result<Self, SettingsError> {
-        let fixed = source.makings()?;
+        let fixed = source.fixed_settings()?;
         let program = source.program(axis, rig, false)?;
         let (variables, values) = (program.variables().to_vec(), program.values().to_vec());
         let path = source.path.clone();
@@ -78,7 +78,7 @@ impl ProgramFile {
         }
         let reported = |problem: String| format!("{}: {problem}", self.path.display());
         // Checked before the library is loaded.
-        let fixed = source.makings().map_err(|error| error.to_string())?;
+        let fixed = source.fixed_settings().map_err(|error| error.to_string())?;
         if let Some(problem) = fixed_change(&self.fixed, &fixed) {
             return Err(reported(problem));
         }
@@ -191,7 +191,7 @@ still_m = 0.001
     fn another_library_under_the_same_table_is_another_algorithm() {
         let library = |name: &str| {
             let text = format!("title = \"t\"\n[algorithm]\nlibrary = \"{name}\"\n");
-            Source { path: "p.toml".into(), title: "t".into(), text }.makings().unwrap()
+            Source { path: "p.toml".into(), title: "t".into(), text }.fixed_settings().unwrap()
         };
         let problem = fixed_change(&library("a.so"), &library("b.so")).unwrap();
         assert!(problem.starts_with("algorithm.library is \"b.so\" and was \"a.so\""), "{problem}");

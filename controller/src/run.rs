@@ -2,15 +2,15 @@
 
 use crate::Node;
 use crate::cli::{Axes, Pace, RunArguments};
-use crate::pace::{self, End, RunContext, RunOutcome};
+use crate::pace::{self, RunContext, RunEnd, RunOutcome};
 use crate::recording::{Tables, Writer, WriterResult};
 use crate::reload::Reloader;
 use crate::report::{self, AxisReport, Report};
 use crate::timing::Stopwatch;
 use crate::timing::setup::{self, RunStart};
-use algorithms::guard::STUCK;
+use algorithms::guard::HANG_MESSAGE;
 use axis_control::axis::AxisController;
-use axis_control::node::{Change, ControllerNode, Outlets};
+use axis_control::node::{Change, ControllerNode, NodeQueues};
 use axis_control::setup::{InputError, Inputs, Mode};
 use crossbeam_channel::{Sender, bounded};
 use nominal::Axis;
@@ -34,7 +34,7 @@ use xcp::port::{Port, Queues};
 const ROW_QUEUE: usize = 32 * 1024;
 const NEWS_QUEUE: usize = 1024;
 const CHANGE_QUEUE: usize = 1024;
-const NOTE_QUEUE: usize = 1024;
+const MESSAGE_QUEUE: usize = 1024;
 /// At most one copy of an axis's parameters is in transit.
 const RETURNED_QUEUE: usize = 2;
 
@@ -104,13 +104,13 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let (record_sender, records) = bounded(ROW_QUEUE);
     let (news_sender, news) = bounded(NEWS_QUEUE);
     let (change_sender, changes) = bounded(CHANGE_QUEUE);
-    let outlets = Outlets { records: record_sender, news: news_sender, changes, waits: !real_time };
+    let node_queues = NodeQueues { records: record_sender, news: news_sender, changes, waits: !real_time };
     let (mut ports, parameter_files) = match &xcp {
         Some(config) => open_xcp(arguments, &inputs, config, &controllers, &change_sender)?,
         None => (Vec::new(), None),
     };
     let port_of = |axis| Some(ports.swap_remove(ports.iter().position(|port: &Port| port.axis == axis)?));
-    let node = ControllerNode::with_ports(controllers, outlets, port_of);
+    let node = ControllerNode::with_ports(controllers, node_queues, port_of);
     let reloader = arguments.watch.then(|| Reloader::new(&inputs, axes, change_sender));
     let started = RunStart::now();
     let timing = real_time.then(|| setup::begin(arguments, &started, signals.freeze)).transpose()?;
@@ -120,7 +120,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         let asking = &signals.interrupt;
         let writer = scope.spawn(move || {
             let writer = Writer { tables, records, news, reloader, parameter_files, timing };
-            writer.run(|| asking.ask(), || end_stuck(out, axes))
+            writer.run(|| asking.ask(), || end_hung(out, axes))
         });
         let bus = bus.as_mut();
         let (interrupt, continued) = (&signals.interrupt, signals.continued);
@@ -141,12 +141,12 @@ fn open_xcp(
     changes: &Sender<Change>,
 ) -> Result<(Vec<Port>, Option<ParameterFileWorker>), RunError> {
     let out = &arguments.files.out;
-    let (note_sender, notes) = bounded(NOTE_QUEUE);
+    let (message_sender, messages) = bounded(MESSAGE_QUEUE);
     let (mut ports, mut axes) = (Vec::new(), Vec::new());
     for controller in controllers {
         let (axis, program) = (controller.axis, &controller.program);
         let (returned_sender, returned) = bounded(RETURNED_QUEUE);
-        let queues = Queues { notes: note_sender.clone(), returned };
+        let queues = Queues { messages: message_sender.clone(), returned };
         let title = inputs.program_title(axis);
         // In simulated time runs repeat exactly, seeds included.
         let random = if arguments.pace == Pace::Real { random()? } else { [0; 16] };
@@ -159,7 +159,7 @@ fn open_xcp(
             .map_err(|error| RunError::Output(format!("{}: {error}", path.display())))?;
         axes.push(AxisParameters { axis, variables, values, returned: returned_sender });
     }
-    Ok((ports, Some(ParameterFileWorker::new(notes, axes, changes.clone(), out))))
+    Ok((ports, Some(ParameterFileWorker::new(messages, axes, changes.clone(), out))))
 }
 
 /// Start of the seeds, from the random source of the system.
@@ -185,12 +185,12 @@ impl Signals {
     }
 }
 
-/// Ends the process whose loop is stuck in an algorithm; its thread cannot be stopped.
-fn end_stuck(out: &Path, axes: &[Axis]) {
-    protocol::say!("controller: {STUCK}");
+/// Ends the process whose algorithm does not return; its thread cannot be stopped.
+fn end_hung(out: &Path, axes: &[Axis]) {
+    protocol::say!("controller: {HANG_MESSAGE}");
     let exit = Exit::BoundBroken;
     let report = serde_json::json!({
-        "schema_version": SCHEMA_VERSION, "ended_well": false, "ended_because": STUCK,
+        "schema_version": SCHEMA_VERSION, "ended_well": false, "ended_because": HANG_MESSAGE,
     });
     if let Err(error) = write_json(&out.join(report::process(axes).report()), &report) {
         protocol::say!("controller: cannot write {error}");
@@ -237,7 +237,7 @@ impl ControlLoop<'_> {
             None => pace::run_lockstep(context, member_name(arguments.axis))?,
         };
         if arguments.pace == Pace::Real {
-            pace::drain_and_leave(bus, outcome.end == End::RigEnded);
+            pace::drain_and_leave(bus, outcome.end == RunEnd::RigEnded);
         }
         let mut axes = report::of_node(&node, inputs);
         for axis in Axis::ALL {
@@ -285,16 +285,16 @@ fn verdict(arguments: &RunArguments, run: &FinishedRun) -> (Exit, String) {
     };
     match outcome.end {
         _ if run.written.failure.is_some() => (Exit::BadInput, "the output could not be written".into()),
-        End::Stopped => aborted(),
-        End::RigEnded if stopped.is_some() => aborted(),
-        End::RigEnded if done => (Exit::Good, "done, and the rig has ended".into()),
-        End::RigEnded => (Exit::BusFailed, "the rig ended before the experiment was done".into()),
-        End::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
-        End::BusGone => (
+        RunEnd::Stopped => aborted(),
+        RunEnd::RigEnded if stopped.is_some() => aborted(),
+        RunEnd::RigEnded if done => (Exit::Good, "done, and the rig has ended".into()),
+        RunEnd::RigEnded => (Exit::BusFailed, "the rig ended before the experiment was done".into()),
+        RunEnd::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
+        RunEnd::BusGone => (
             Exit::BusFailed,
             "nothing to answer for too long; is 'emulator run' on this bus, in the same --pace? see --bus-grace".into(),
         ),
-        End::LockstepTimeout => {
+        RunEnd::LockstepTimeout => {
             (Exit::LockstepTimeout, "a member of the barrier was not done in time".into())
         }
     }

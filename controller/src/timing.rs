@@ -54,7 +54,7 @@ pub(crate) struct StampedFrame {
     pub(crate) sent: bool,
 }
 
-pub(crate) struct Outlets {
+pub(crate) struct TimingSenders {
     pub(crate) measured: Sender<TimingSample>,
     pub(crate) frames: Sender<StampedFrame>,
 }
@@ -82,7 +82,7 @@ pub(crate) struct Stopwatch<C> {
     clock: C,
     own: [bool; 2],
     wakes: Axis,
-    outlets: Outlets,
+    senders: TimingSenders,
     account: StopwatchAccount,
     began_ns: u64,
     wake_up: WakeUp,
@@ -99,14 +99,14 @@ impl<C: Clock> Stopwatch<C> {
     ///
     /// # Panics
     /// Without axes.
-    pub(crate) fn new(clock: C, axes: &[Axis], outlets: Outlets) -> Self {
+    pub(crate) fn new(clock: C, axes: &[Axis], senders: TimingSenders) -> Self {
         let wakes = *axes.first().expect("a process controls an axis");
         let own = Axis::ALL.map(|axis| axes.contains(&axis));
         Self {
             clock,
             own,
             wakes,
-            outlets,
+            senders,
             account: StopwatchAccount::default(),
             began_ns: 0,
             wake_up: WakeUp::default(),
@@ -231,11 +231,11 @@ impl<C: Clock> Stopwatch<C> {
     }
 
     fn queue_sample(&mut self, measured: TimingSample) {
-        self.account.dropped += u64::from(self.outlets.measured.try_send(measured).is_err());
+        self.account.dropped += u64::from(self.senders.measured.try_send(measured).is_err());
     }
 
     fn queue_frame(&mut self, passed: StampedFrame) {
-        self.account.dropped += u64::from(self.outlets.frames.try_send(passed).is_err());
+        self.account.dropped += u64::from(self.senders.frames.try_send(passed).is_err());
     }
 
     fn now_ns(&self) -> u64 {

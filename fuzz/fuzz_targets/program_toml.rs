@@ -2,7 +2,7 @@
 #![no_main]
 
 use axis_control::program::file::Source;
-use axis_control::program::{Demand, Hand};
+use axis_control::program::{ActiveAlgorithm, Demand};
 use axis_control::set_point::{ForceSetPoint, SetPoint};
 use libfuzzer_sys::fuzz_target;
 use plant::{Axis, RigParameters};
@@ -16,9 +16,9 @@ fuzz_target!(|text: &str| {
     static RIG: OnceLock<RigParameters> = OnceLock::new();
     let rig = RIG.get_or_init(RigParameters::baseline);
     let source = Source { path: "program.toml".into(), title: String::new(), text: text.into() };
-    let Ok(makings) = source.makings() else { return };
+    let Ok(fixed_settings) = source.fixed_settings() else { return };
     // A library is another process's trial; the target `plugin` looks into that.
-    if makings.keys().any(|key| key.ends_with(".library")) {
+    if fixed_settings.keys().any(|key| key.ends_with(".library")) {
         return;
     }
     for axis in Axis::ALL {
@@ -27,7 +27,7 @@ fuzz_target!(|text: &str| {
         for cycle in 0..CYCLES {
             program.observe(cycle, &Sensors { position_m: 0.25, ..Sensors::default() }, 7e5);
             // A fault of the algorithm is an answer; a panic is none.
-            let _ = program.control(cycle, &demand, Hand::User);
+            let _ = program.control(cycle, &demand, ActiveAlgorithm::User);
         }
     }
 });

@@ -1,8 +1,8 @@
-//! What a descriptor's texts and numbers must be, and the trial of an instance; nothing here is foreign any more.
+//! Checks of a descriptor's texts and numbers, and the trial of an instance; nothing here is foreign any more.
 
 use crate::interface::{FORCE, POSITION};
-use crate::wrong::Wrong;
-use algorithms::algorithm::{Quantity, Ready};
+use crate::refusal::RefusalReason;
+use algorithms::algorithm::{AlgorithmInput, Quantity};
 use settings::parameters::Parameter;
 use std::f64::consts::TAU;
 use std::hint::black_box;
@@ -12,35 +12,38 @@ const TAKEN: [&str; 3] = ["name", "library", "every_cycles"];
 
 const TRIAL_STEPS: u32 = 100;
 
-/// What an algorithm controls, by its number in the header.
-pub(super) fn quantity(controls: u32) -> Result<Quantity, Wrong> {
+/// Controlled quantity, by its number in the header.
+pub(super) fn quantity(controls: u32) -> Result<Quantity, RefusalReason> {
     match controls {
         POSITION => Ok(Quantity::Position),
         FORCE => Ok(Quantity::Force),
-        other => Err(Wrong::Controls(other)),
+        other => Err(RefusalReason::Controls(other)),
     }
 }
 
 /// Names are keys of program files and each its own, ranges are ranges, defaults lie in them.
-pub(super) fn table(parameters: &[Parameter]) -> Result<(), Wrong> {
+pub(super) fn table(parameters: &[Parameter]) -> Result<(), RefusalReason> {
     for (place, parameter) in parameters.iter().enumerate() {
         let Parameter { name, least, most, default, .. } = parameter;
         let what = || format!("parameter {}'s name '{name}'", place + 1);
         if name.is_empty() {
-            return Err(Wrong::text(what(), "is empty; give it one"));
+            return Err(RefusalReason::text(what(), "is empty; give it one"));
         }
         if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_' || c == '-') {
-            return Err(Wrong::text(what(), "is no key of a program file: use letters, digits, '_' and '-'"));
+            return Err(RefusalReason::text(
+                what(),
+                "is no key of a program file: use letters, digits, '_' and '-'",
+            ));
         }
         if TAKEN.contains(&name.as_ref()) {
-            return Err(Wrong::text(what(), "has another meaning in a program file; choose another"));
+            return Err(RefusalReason::text(what(), "has another meaning in a program file; choose another"));
         }
         if parameters[..place].iter().any(|other| other.name == *name) {
-            return Err(Wrong::Twice(name.clone().into_owned()));
+            return Err(RefusalReason::DuplicateParameter(name.clone().into_owned()));
         }
         // Not `least >= most`: NaN must be refused too.
         if !(least.is_finite() && most.is_finite() && least < most) {
-            return Err(Wrong::Range { name: name.clone().into_owned(), least: *least, most: *most });
+            return Err(RefusalReason::Range { name: name.clone().into_owned(), least: *least, most: *most });
         }
         parameter.check(*default)?;
     }
@@ -50,29 +53,29 @@ pub(super) fn table(parameters: &[Parameter]) -> Result<(), Wrong> {
 /// Whether this thread rounds as IEEE 754 does by default: to the nearest, with numbers below the smallest normal one.
 ///
 /// gcc links start-up code into every -ffast-math library that flushes those to 0, for the whole thread.
-pub(super) fn arithmetic() -> Result<(), Wrong> {
+pub(super) fn arithmetic() -> Result<(), RefusalReason> {
     let (one, little) = (black_box(1.0), black_box(f64::EPSILON));
     let nearest = one + little / 4.0 == 1.0 && -one - little / 4.0 == -1.0 && one - little / 8.0 == 1.0;
     let subnormal = black_box(f64::MIN_POSITIVE) / black_box(2.0) > 0.0;
-    if nearest && subnormal { Ok(()) } else { Err(Wrong::Arithmetic) }
+    if nearest && subnormal { Ok(()) } else { Err(RefusalReason::Arithmetic) }
 }
 
 /// Runs `step` with inputs of a plausible motion (0.25 m +- 0.1 m, 2 mm behind its set-point, 50 N with ripple): every result
 /// must be finite.
-pub(super) fn trial(mut step: impl FnMut(u32, &Ready) -> f64) -> Result<(), Wrong> {
+pub(super) fn trial(mut step: impl FnMut(u32, &AlgorithmInput) -> f64) -> Result<(), RefusalReason> {
     for number in 1..=TRIAL_STEPS {
         let result = step(number, &plausible(f64::from(number) / f64::from(TRIAL_STEPS)));
         if !result.is_finite() {
-            return Err(Wrong::NotFinite { step: number, result });
+            return Err(RefusalReason::NotFinite { step: number, result });
         }
     }
     Ok(())
 }
 
-/// What is ready at a `share` of the trial's motion, 0 to 1.
-pub(super) fn plausible(share: f64) -> Ready {
+/// The input at a `share` of the trial's motion, 0 to 1.
+pub(super) fn plausible(share: f64) -> AlgorithmInput {
     let (sine, cosine) = (libm::sin(TAU * share), libm::cos(TAU * share));
-    Ready {
+    AlgorithmInput {
         period_s: 0.001,
         position_m: 0.248 + 0.1 * sine,
         velocity_m_per_s: 0.2 * cosine,
@@ -131,7 +134,7 @@ mod tests {
     #[test]
     fn a_trial_names_the_step_that_gave_no_number() {
         let refusal =
-            trial(|number, ready| if number == 7 { f64::NAN } else { ready.position_m }).unwrap_err();
-        assert!(matches!(refusal, Wrong::NotFinite { step: 7, .. }), "{refusal}");
+            trial(|number, input| if number == 7 { f64::NAN } else { input.position_m }).unwrap_err();
+        assert!(matches!(refusal, RefusalReason::NotFinite { step: 7, .. }), "{refusal}");
     }
 }

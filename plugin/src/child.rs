@@ -9,8 +9,8 @@
 //!
 //! The child has no real-time priority as long as libraries are loaded before the thread asks for one.
 
-use crate::wrong::Wrong;
-use crate::{PluginError, probe_telling};
+use crate::refusal::RefusalReason;
+use crate::{PluginError, probe_with_stages};
 use protocol::exit::Exit;
 use std::env;
 use std::io::{self, PipeReader, Read, Write};
@@ -47,16 +47,16 @@ impl TrialRunner {
     /// This program if it is the controller, else the one in its folder or in the folder around that (as for test programs).
     ///
     /// # Errors
-    /// [`Wrong::NoTrialRunner`] with the places that were looked at.
-    pub fn find() -> Result<Self, Wrong> {
+    /// [`RefusalReason::NoTrialRunner`] with the places that were looked at.
+    pub fn find() -> Result<Self, RefusalReason> {
         const NAME: &str = "controller";
-        let own = env::current_exe().map_err(Wrong::NoChild)?;
+        let own = env::current_exe().map_err(RefusalReason::NoChild)?;
         let around = own.ancestors().skip(1).take(2).map(|folder| folder.join(NAME));
         let places: Vec<_> =
             if own.file_name().is_some_and(|name| name == NAME) { vec![own] } else { around.collect() };
         let found = places.iter().find(|place| place.is_file()).cloned();
         let program = found.ok_or_else(|| {
-            Wrong::NoTrialRunner(
+            RefusalReason::NoTrialRunner(
                 places.iter().map(|place| place.display().to_string()).collect::<Vec<_>>().join(", "),
             )
         })?;
@@ -64,17 +64,17 @@ impl TrialRunner {
     }
 
     /// Has a child open, ask and run the library.
-    pub(super) fn try_out(&self, library: &Path) -> Result<(), Wrong> {
-        let (reader, writer) = io::pipe().map_err(Wrong::NoChild)?;
+    pub(super) fn try_out(&self, library: &Path) -> Result<(), RefusalReason> {
+        let (reader, writer) = io::pipe().map_err(RefusalReason::NoChild)?;
         let mut command = Command::new(&self.program);
         command.args([COMMAND, "--"]).arg(library).stdin(Stdio::null());
-        command.stdout(writer.try_clone().map_err(Wrong::NoChild)?).stderr(writer);
+        command.stdout(writer.try_clone().map_err(RefusalReason::NoChild)?).stderr(writer);
         let started = command.spawn();
         // The command holds the pipe's other end; its text ends only when nobody does.
         drop(command);
-        let mut child = started.map_err(Wrong::NoChild)?;
+        let mut child = started.map_err(RefusalReason::NoChild)?;
         let output = read_aside(reader);
-        let status = wait(&mut child, self.limit).map_err(Wrong::NoChild)?;
+        let status = wait(&mut child, self.limit).map_err(RefusalReason::NoChild)?;
         judge(self, status, &collect(&output))
     }
 }
@@ -87,27 +87,27 @@ pub fn run(library: &Path) -> Exit {
         // Nobody reads: then nobody wants to know.
         let _ = writeln!(out, "\n{MARK}{text}").and_then(|()| out.flush());
     };
-    match probe_telling(library, &mut |stage| say(&format!("at {stage}"))) {
+    match probe_with_stages(library, &mut |stage| say(&format!("at {stage}"))) {
         Ok(_) => {
             say("good");
             Exit::Good
         }
-        Err(PluginError { wrong, .. }) => {
-            say(&format!("refused {}", wrong.to_string().replace('\n', " ")));
+        Err(PluginError { reason, .. }) => {
+            say(&format!("refused {}", reason.to_string().replace('\n', " ")));
             Exit::BadInput
         }
     }
 }
 
-/// What a child has printed.
-struct Said {
+/// Output of a child.
+struct ChildOutput {
     tail: Arc<Mutex<Vec<u8>>>,
-    /// Told when the pipe has ended.
+    /// Signalled when the pipe has ended.
     ended: Receiver<()>,
 }
 
 /// Reads in a thread of its own, so that a library that prints much does not block on a full pipe.
-fn read_aside(mut reader: PipeReader) -> Said {
+fn read_aside(mut reader: PipeReader) -> ChildOutput {
     let (sender, ended) = mpsc::channel();
     let tail = Arc::new(Mutex::new(Vec::new()));
     let kept = Arc::clone(&tail);
@@ -124,11 +124,11 @@ fn read_aside(mut reader: PipeReader) -> Said {
         // Nobody waits any more: then nobody wants to know.
         let _ = sender.send(());
     });
-    Said { tail, ended }
+    ChildOutput { tail, ended }
 }
 
-/// What was read until the pipe's end; a grandchild that holds it open is not waited for.
-fn collect(output: &Said) -> String {
+/// Output until the pipe's end; a grandchild that holds it open is not waited for.
+fn collect(output: &ChildOutput) -> String {
     let _ = output.ended.recv_timeout(Duration::from_secs(1));
     String::from_utf8_lossy(&output.tail.lock().expect("the reader does not panic with it")).into_owned()
 }
@@ -149,8 +149,8 @@ fn wait(child: &mut Child, limit: Duration) -> io::Result<Option<ExitStatus>> {
     }
 }
 
-/// What the status (None: killed) and the text of a child mean.
-fn judge(trier: &TrialRunner, status: Option<ExitStatus>, text: &str) -> Result<(), Wrong> {
+/// Verdict from the exit status (`None`: killed) and the output of a child.
+fn judge(runner: &TrialRunner, status: Option<ExitStatus>, text: &str) -> Result<(), RefusalReason> {
     let (mut stage, mut verdict, mut last) = (None, None, "");
     for line in text.lines().map(str::trim).filter(|line| !line.is_empty()) {
         match line.strip_prefix(MARK).map(|reported| reported.split_once(' ').unwrap_or((reported, ""))) {
@@ -162,13 +162,13 @@ fn judge(trier: &TrialRunner, status: Option<ExitStatus>, text: &str) -> Result<
     let output = if last.is_empty() { String::new() } else { format!(" (it said: {last})") };
     let during = format!("{}{output}", stage.as_deref().unwrap_or("an unknown step"));
     match (status, verdict) {
-        (None, _) => Err(Wrong::Hung { limit: trier.limit, during }),
-        (Some(status), _) if status.signal().is_some() => Err(Wrong::Crashed { status, during }),
+        (None, _) => Err(RefusalReason::Hung { limit: runner.limit, during }),
+        (Some(status), _) if status.signal().is_some() => Err(RefusalReason::Crashed { status, during }),
         // It reported no stage: another program, or an older one.
-        _ if stage.is_none() => Err(Wrong::ForeignTrier(trier.program.clone())),
+        _ if stage.is_none() => Err(RefusalReason::NotATrialRunner(runner.program.clone())),
         (Some(status), Some(("good", _))) if status.success() => Ok(()),
-        (Some(_), Some(("refused", why))) => Err(Wrong::Told(why.to_owned())),
-        (Some(status), _) => Err(Wrong::Ended { status, during }),
+        (Some(_), Some(("refused", why))) => Err(RefusalReason::Reported(why.to_owned())),
+        (Some(status), _) => Err(RefusalReason::Ended { status, during }),
     }
 }
 
@@ -177,9 +177,9 @@ mod tests {
     use super::*;
 
     fn judged(status: Option<i32>, text: &str) -> String {
-        let trier = TrialRunner { program: "controller".into(), limit: TRIAL_LIMIT };
-        let verdict = judge(&trier, status.map(ExitStatus::from_raw), text);
-        verdict.map_or_else(|wrong| wrong.to_string(), |()| "good".to_owned())
+        let runner = TrialRunner { program: "controller".into(), limit: TRIAL_LIMIT };
+        let verdict = judge(&runner, status.map(ExitStatus::from_raw), text);
+        verdict.map_or_else(|reason| reason.to_string(), |()| "good".to_owned())
     }
 
     #[test]

@@ -15,8 +15,8 @@ use std::path::Path;
 /// [`PluginError`] for a library that is refused, or without a program to try it with.
 pub fn check_library(library: &Path) -> Result<Exit, PluginError> {
     let description = TrialRunner::find()
-        .map_err(|wrong| PluginError { library: library.to_owned(), wrong })
-        .and_then(|trier| describe(&trier, library))?;
+        .map_err(|reason| PluginError { library: library.to_owned(), reason })
+        .and_then(|runner| describe(&runner, library))?;
     // A closed pipe is the reader's wish.
     let _ = write!(io::stdout(), "{description}");
     Ok(Exit::Good)

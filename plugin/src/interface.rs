@@ -1,9 +1,9 @@
 //! The C interface's layout: the structures of `include/airbench_algorithm.h`, field by field.
 //!
-//! The header is the truth for authors of libraries; a test has the C compiler tell its sizes and offsets and compares
-//! them with those here. `airbench_ready` is [`Ready`] itself.
+//! The header is the truth for authors of libraries; a test has the C compiler print its sizes and offsets and compares
+//! them with those here. `airbench_ready` is [`AlgorithmInput`] itself.
 
-use algorithms::algorithm::Ready;
+use algorithms::algorithm::AlgorithmInput;
 use nominal::RigParameters;
 use std::ffi::{c_char, c_void};
 
@@ -19,7 +19,7 @@ pub(super) const POSITION: u32 = 1;
 pub(super) const FORCE: u32 = 2;
 
 // A field that is added to what every algorithm gets changes the interface: then its version grows and the header follows.
-const _: () = assert!(size_of::<Ready>() == 14 * size_of::<f64>() && INTERFACE_VERSION == 1);
+const _: () = assert!(size_of::<AlgorithmInput>() == 14 * size_of::<f64>() && INTERFACE_VERSION == 1);
 
 /// `airbench_algorithm_entry`; None is a symbol whose address is 0.
 pub(super) type Entry = Option<unsafe extern "C" fn(u32) -> *const Descriptor>;
@@ -101,8 +101,8 @@ pub(super) struct Descriptor {
 
 pub(super) type Create = unsafe extern "C" fn(*const NominalRig) -> *mut c_void;
 pub(super) type Destroy = unsafe extern "C" fn(*mut c_void);
-pub(super) type Reset = unsafe extern "C" fn(*mut c_void, *const Ready, *const f64);
-pub(super) type Step = unsafe extern "C" fn(*mut c_void, *const Ready, *const f64) -> f64;
+pub(super) type Reset = unsafe extern "C" fn(*mut c_void, *const AlgorithmInput, *const f64);
+pub(super) type Step = unsafe extern "C" fn(*mut c_void, *const AlgorithmInput, *const f64) -> f64;
 
 #[cfg(test)]
 mod tests {
@@ -127,7 +127,7 @@ mod tests {
     #[test]
     fn the_header_lays_everything_out_as_rust_does() {
         let layouts = [
-            layout!(Ready, "airbench_ready": period_s position_m velocity_m_per_s acceleration_m_per_s2 force_n
+            layout!(AlgorithmInput, "airbench_ready": period_s position_m velocity_m_per_s acceleration_m_per_s2 force_n
                 pressure_a_pa pressure_b_pa supply_pressure_pa set_position_m set_velocity_m_per_s
                 set_acceleration_m_per_s2 set_force_n set_force_rate_n_per_s applied_velocity_m_per_s),
             layout!(NominalRig, "airbench_rig": stroke_m piston_area_m2 annulus_area_m2 dead_volume_m3 drive_mass_kg
@@ -137,7 +137,11 @@ mod tests {
             layout!(Descriptor, "airbench_algorithm": interface_version struct_size name about controls
                 parameter_count parameters create destroy reset step),
         ];
-        assert_eq!(layouts[0].0 * size_of::<f64>(), size_of::<Ready>(), "every field of Ready stands above");
+        assert_eq!(
+            layouts[0].0 * size_of::<f64>(),
+            size_of::<AlgorithmInput>(),
+            "every field of AlgorithmInput stands above"
+        );
         assert_eq!(layouts[1].0 * size_of::<f64>(), size_of::<NominalRig>(), "every field of the rig");
 
         let folder = tempfile::tempdir().expect("a folder");

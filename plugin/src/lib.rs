@@ -20,7 +20,7 @@
 //! | `check.rs` | what texts and numbers must be, the trial's inputs |
 //! | `child.rs` | the trial in a process of its own |
 //! | `command.rs` | `controller check-library FILE` |
-//! | `wrong.rs` | the refusals |
+//! | `refusal.rs` | the refusals |
 
 #![warn(missing_docs)] // an interface of other crates
 
@@ -29,9 +29,9 @@ mod child;
 pub mod command;
 mod foreign;
 mod interface;
-mod wrong;
+mod refusal;
 
-use algorithms::algorithm::{Algorithm, Quantity, Ready};
+use algorithms::algorithm::{Algorithm, AlgorithmInput, Quantity};
 use nominal::RigParameters;
 use settings::parameters::Parameter;
 use std::fs;
@@ -39,19 +39,19 @@ use std::path::{Path, PathBuf};
 
 pub use child::{TRIAL_LIMIT, TrialRunner};
 pub use interface::INTERFACE_VERSION;
-pub use wrong::{PluginError, Wrong};
+pub use refusal::{PluginError, RefusalReason};
 
-/// Called with what comes next.
-type Tell<'a> = &'a mut dyn FnMut(&str);
+/// Called with the name of each stage of the trial before it begins.
+type StageReport<'a> = &'a mut dyn FnMut(&str);
 
-/// What a library offers.
+/// Description of the algorithm in a library.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Description {
     /// Its name for people and records; a program file names the library by its path.
     pub name: String,
-    /// What it does, for people.
+    /// One sentence for people.
     pub about: String,
-    /// What it controls: a position or a force.
+    /// Controlled quantity: a position or a force.
     pub controls: Quantity,
     /// Its parameters, in the order of the slices.
     pub parameters: Vec<Parameter>,
@@ -59,18 +59,18 @@ pub struct Description {
 
 /// An algorithm of a shared library.
 pub struct Plugin {
-    /// What its library says of it.
+    /// Description by its library.
     pub description: Description,
     instance: foreign::Instance,
 }
 
 impl Algorithm for Plugin {
-    fn reset(&mut self, ready: &Ready, parameters: &[f64]) {
-        self.instance.reset(ready, parameters);
+    fn reset(&mut self, input: &AlgorithmInput, parameters: &[f64]) {
+        self.instance.reset(input, parameters);
     }
 
-    fn step(&mut self, ready: &Ready, parameters: &[f64]) -> f64 {
-        self.instance.step(ready, parameters)
+    fn step(&mut self, input: &AlgorithmInput, parameters: &[f64]) -> f64 {
+        self.instance.step(input, parameters)
     }
 }
 
@@ -79,35 +79,36 @@ impl Algorithm for Plugin {
 /// # Errors
 /// [`PluginError`] when there is no program to try it with, when it fails the trial or when it cannot be loaded.
 pub fn load(path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
-    let trier = TrialRunner::find().map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
-    load_tried_by(&trier, path, rig)
+    let runner = TrialRunner::find().map_err(|reason| PluginError { library: path.to_owned(), reason })?;
+    load_tried_by(&runner, path, rig)
 }
 
-/// [`load`] with a trier that is named.
+/// [`load`] with a named trial runner.
 ///
 /// # Errors
 /// Those of [`load`], but for the missing program.
-pub fn load_tried_by(trier: &TrialRunner, path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
-    let made = || {
-        let offer = tried_out(trier, path)?;
-        let instance = foreign::Instance::create(&offer, &rig.into())?;
-        Ok(Plugin { description: offer.description, instance })
+pub fn load_tried_by(runner: &TrialRunner, path: &Path, rig: &RigParameters) -> Result<Plugin, PluginError> {
+    let load = || {
+        let library = try_and_open(runner, path)?;
+        let instance = foreign::Instance::create(&library, &rig.into())?;
+        Ok(Plugin { description: library.description, instance })
     };
-    made().map_err(|wrong| PluginError { library: path.to_owned(), wrong })
+    load().map_err(|reason| PluginError { library: path.to_owned(), reason })
 }
 
-/// What the library of `path` offers, after a trial in a child process.
+/// Description of the library at `path`, after a trial in a child process.
 ///
 /// # Errors
 /// [`PluginError`] when it fails the trial or cannot be opened.
-pub fn describe(trier: &TrialRunner, path: &Path) -> Result<Description, PluginError> {
-    let offer = tried_out(trier, path).map_err(|wrong| PluginError { library: path.to_owned(), wrong })?;
-    Ok(offer.description)
+pub fn describe(runner: &TrialRunner, path: &Path) -> Result<Description, PluginError> {
+    let library =
+        try_and_open(runner, path).map_err(|reason| PluginError { library: path.to_owned(), reason })?;
+    Ok(library.description)
 }
 
-fn tried_out(trier: &TrialRunner, path: &Path) -> Result<foreign::Offer, Wrong> {
+fn try_and_open(runner: &TrialRunner, path: &Path) -> Result<foreign::CheckedLibrary, RefusalReason> {
     let file = absolute(path)?;
-    trier.try_out(&file)?;
+    runner.try_out(&file)?;
     foreign::open(&file, &mut |_| ())
 }
 
@@ -117,32 +118,33 @@ fn tried_out(trier: &TrialRunner, path: &Path) -> Result<foreign::Offer, Wrong> 
 /// # Errors
 /// [`PluginError`] for a library that is refused.
 pub fn probe(path: &Path) -> Result<Description, PluginError> {
-    probe_telling(path, &mut |_| ())
+    probe_with_stages(path, &mut |_| ())
 }
 
-fn probe_telling(path: &Path, tell: Tell<'_>) -> Result<Description, PluginError> {
-    let tried = |tell: Tell<'_>| {
+fn probe_with_stages(path: &Path, report_stage: StageReport<'_>) -> Result<Description, PluginError> {
+    let probe = |report_stage: StageReport<'_>| {
         let file = absolute(path)?;
-        let offer = foreign::open(&file, tell)?;
-        let values: Vec<_> = offer.description.parameters.iter().map(|parameter| parameter.default).collect();
-        tell("create");
-        let mut instance = foreign::Instance::create(&offer, &(&RigParameters::baseline()).into())?;
-        tell("reset");
+        let library = foreign::open(&file, report_stage)?;
+        let values: Vec<_> =
+            library.description.parameters.iter().map(|parameter| parameter.default).collect();
+        report_stage("create");
+        let mut instance = foreign::Instance::create(&library, &(&RigParameters::baseline()).into())?;
+        report_stage("reset");
         instance.reset(&check::plausible(0.0), &values);
-        check::trial(|number, ready| {
-            tell(&format!("step {number}"));
-            instance.step(ready, &values)
+        check::trial(|number, input| {
+            report_stage(&format!("step {number}"));
+            instance.step(input, &values)
         })?;
         check::arithmetic()?;
-        tell("destroy");
+        report_stage("destroy");
         drop(instance);
-        tell("its clean-up at the end of the process");
-        Ok(offer.description)
+        report_stage("its clean-up at the end of the process");
+        Ok(library.description)
     };
-    tried(tell).map_err(|wrong| PluginError { library: path.to_owned(), wrong })
+    probe(report_stage).map_err(|reason| PluginError { library: path.to_owned(), reason })
 }
 
 /// With a `/` in it, so that the system looks at this file and not through its folders of libraries.
-fn absolute(path: &Path) -> Result<PathBuf, Wrong> {
-    fs::canonicalize(path).map_err(Wrong::File)
+fn absolute(path: &Path) -> Result<PathBuf, RefusalReason> {
+    fs::canonicalize(path).map_err(RefusalReason::File)
 }

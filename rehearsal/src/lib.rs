@@ -18,7 +18,7 @@ mod files;
 pub use files::{PlantTables, RehearsalError, of_inputs, scene};
 
 use axis_control::axis::{AxisController, AxisRecord};
-use axis_control::node::{ControllerNode, NodeEvent, Outlets, STOPPED_CYCLES};
+use axis_control::node::{ControllerNode, NodeEvent, NodeQueues, STOPPED_CYCLES};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use plant::scene::Action;
 use plant::tables::CycleRecord;
@@ -28,10 +28,10 @@ use protocol::can::CanFrame;
 use protocol::frames::{EncodeError, Frame, ValveCommand};
 use rig_node::{PeopledPlant, RigNode, SimulatedRig};
 
-/// Rows and news of a cycle: two and some.
-const OUTLET_ROOM: usize = 64;
+/// Length of the queues: a cycle leaves two rows and few events.
+const QUEUE_LENGTH: usize = 64;
 
-/// What a rehearsal is made of.
+/// Parts of a rehearsal.
 pub struct RehearsalParts<'a> {
     /// The rig's numbers.
     pub rig: &'a RigParameters,
@@ -52,15 +52,15 @@ pub struct Rehearsal<R = PeopledPlant> {
     news: Receiver<NodeEvent>,
     cycle: u64,
     closing: bool,
-    off_the_wire: Option<EncodeError>,
+    encode_error: Option<EncodeError>,
     listener: Option<Sender<CanFrame>>,
 }
 
-/// What a cycle left.
-pub struct Rehearsed<C = CycleRecord> {
-    /// What the rig shows and what only a simulation knows.
+/// Records of a cycle.
+pub struct RehearsalRow<C = CycleRecord> {
+    /// Readings and truth of the rig.
     pub cycle: C,
-    /// What each axis did; `None` where it was not recorded.
+    /// Record of each axis; `None` where it was not recorded.
     pub axes: [Option<AxisRecord>; 2],
 }
 
@@ -99,43 +99,43 @@ impl<R: SimulatedRig> Rehearsal<R> {
     /// A rehearsal of any simulated rig under the controllers of both axes, before its first cycle.
     #[must_use]
     pub fn with_rig(rig: R, controllers: Vec<AxisController>) -> Self {
-        let (record_sender, records) = bounded(OUTLET_ROOM);
-        let (news_sender, news) = bounded(OUTLET_ROOM);
+        let (record_sender, records) = bounded(QUEUE_LENGTH);
+        let (news_sender, news) = bounded(QUEUE_LENGTH);
         let (_, changes) = bounded(1);
-        let outlets = Outlets { records: record_sender, news: news_sender, changes, waits: false };
+        let node_queues = NodeQueues { records: record_sender, news: news_sender, changes, waits: false };
         Self {
             rig: RigNode::new(rig, true),
-            node: ControllerNode::new(controllers, outlets),
+            node: ControllerNode::new(controllers, node_queues),
             wire: Wire::default(),
             records,
             news,
             cycle: 0,
             closing: false,
-            off_the_wire: None,
+            encode_error: None,
             listener: None,
         }
     }
 
-    /// Runs one cycle of 1 ms; `tell` gets what happens at the rig, each with its cycle.
-    pub fn step(&mut self, mut tell: impl FnMut(u64, R::Event)) -> Rehearsed<R::Cycle> {
+    /// Runs one cycle of 1 ms; `on_event` gets the events of the rig with their cycle.
+    pub fn step(&mut self, mut on_event: impl FnMut(u64, R::Event)) -> RehearsalRow<R::Cycle> {
         let cycle = self.cycle;
         self.cycle += 1;
         let acting = self.rig.openings(self.wire.commands());
         self.rig.rig_mut().expect_valves(acting);
-        let readings = self.rig.begin(cycle, &mut |event| tell(cycle, event));
+        let readings = self.rig.begin(cycle, &mut |event| on_event(cycle, event));
         // The rig's last cycle is the one in which it hears that all are done; nobody answers it.
         self.closing = self.node.done();
-        let Self { rig, node, listener, off_the_wire, .. } = self;
+        let Self { rig, node, listener, encode_error, .. } = self;
         rig.publish(cycle, false, &readings, |frame| match frame.encode() {
             Ok(frame) => {
                 listener.iter().for_each(|listener| _ = listener.try_send(frame));
                 node.take(&frame);
             }
-            Err(error) => _ = off_the_wire.get_or_insert(error),
+            Err(error) => _ = encode_error.get_or_insert(error),
         });
         // What the controllers sent in the last cycle arrives before this one acts.
         for frame in std::mem::take(&mut self.wire.sent).into_iter().flatten() {
-            self.rig.take(frame, &mut |event| tell(cycle, event));
+            self.rig.take(frame, &mut |event| on_event(cycle, event));
         }
         for axis in Axis::ALL {
             self.rig.latch(axis);
@@ -146,7 +146,7 @@ impl<R: SimulatedRig> Rehearsal<R> {
         let cycle = self.rig.step(cycle);
         let mut axes = [None, None];
         self.records.try_iter().for_each(|record| axes[record.axis.index()] = Some(record));
-        Rehearsed { cycle, axes }
+        RehearsalRow { cycle, axes }
     }
 
     /// Copies each frame of the rig into this queue; what does not fit is lost.
@@ -180,13 +180,13 @@ impl<R: SimulatedRig> Rehearsal<R> {
     /// Whether the controllers are done, or stopped for good, or the rig broke.
     #[must_use]
     pub fn ended(&self) -> bool {
-        self.closing || self.off_the_wire.is_some() || self.node.stopped_for() > STOPPED_CYCLES
+        self.closing || self.encode_error.is_some() || self.node.stopped_for() > STOPPED_CYCLES
     }
 
     /// The first value of the rig that rig.dbc does not allow: its numbers drive it out of all bounds.
     #[must_use]
-    pub fn off_the_wire(&self) -> Option<EncodeError> {
-        self.off_the_wire
+    pub fn encode_error(&self) -> Option<EncodeError> {
+        self.encode_error
     }
 }
 

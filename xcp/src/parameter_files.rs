@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A port's request or report to the worker; `cycle` is the rig's cycle that was answered last.
 #[derive(Debug)]
-pub enum Note {
+pub enum PortMessage {
     /// A client changed a parameter.
     Changed {
         /// Axis of the port.
@@ -73,9 +73,9 @@ pub struct AxisParameters {
     pub returned: Sender<ParameterCopy>,
 }
 
-/// Stores and loads parameter sets for the ports, and reports their notes; it runs outside the 1 ms path.
+/// Stores and loads parameter sets for the ports, and reports their messages; it runs outside the 1 ms path.
 pub struct ParameterFileWorker {
-    notes: Receiver<Note>,
+    messages: Receiver<PortMessage>,
     axes: Vec<AxisParameters>,
     changes: Sender<Change>,
     folder: PathBuf,
@@ -84,20 +84,20 @@ pub struct ParameterFileWorker {
 impl ParameterFileWorker {
     /// A worker for these axes. `folder` is the run's folder; loaded values go to `changes`.
     pub fn new(
-        notes: Receiver<Note>,
+        messages: Receiver<PortMessage>,
         axes: Vec<AxisParameters>,
         changes: Sender<Change>,
         folder: &Path,
     ) -> Self {
-        Self { notes, axes, changes, folder: folder.into() }
+        Self { messages, axes, changes, folder: folder.into() }
     }
 
-    /// Processes the notes that wait; the recorder's thread calls it in each of its rounds.
+    /// Processes the messages that wait; the recorder's thread calls it in each of its rounds.
     pub fn poll(&mut self) {
-        let notes = self.notes.clone();
-        for note in notes.try_iter() {
-            match note {
-                Note::Changed { axis, cycle, place, value } => {
+        let messages = self.messages.clone();
+        for message in messages.try_iter() {
+            match message {
+                PortMessage::Changed { axis, cycle, place, value } => {
                     let name = self
                         .parameters_of(axis)
                         .and_then(|axis_parameters| axis_parameters.variables.get(place))
@@ -108,17 +108,17 @@ impl ParameterFileWorker {
                         axis.name()
                     );
                 }
-                Note::Unlocked { axis, cycle } => {
+                PortMessage::Unlocked { axis, cycle } => {
                     protocol::say!("controller: cycle {cycle}: XCP of the {} axis is unlocked", axis.name());
                 }
-                Note::WrongKey { axis, cycle } => {
+                PortMessage::WrongKey { axis, cycle } => {
                     protocol::say!(
                         "controller: cycle {cycle}: a wrong key to XCP of the {} axis",
                         axis.name()
                     );
                 }
-                Note::Store { axis, values } => self.store(axis, values),
-                Note::Load { axis } => match self.load(axis) {
+                PortMessage::Store { axis, values } => self.store(axis, values),
+                PortMessage::Load { axis } => match self.load(axis) {
                     Ok(count) => {
                         protocol::say!(
                             "controller: {count} parameters of the {} axis loaded, by XCP",

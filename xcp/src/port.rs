@@ -10,8 +10,8 @@ use crate::identifiers;
 use crate::image::{Image, ParameterActions};
 use crate::lock::Lock;
 use crate::packet::{BYTES, Packet};
-use crate::parameter_files::{Note, ParameterCopy};
-use crate::signals::{self, View};
+use crate::parameter_files::{ParameterCopy, PortMessage};
+use crate::signals::{self, CycleData};
 use crate::slave::{Slave, SlaveCounters};
 use axis_control::axis::AxisController;
 use axis_control::node::CalibrationPort;
@@ -46,7 +46,7 @@ pub struct PortCounters {
 /// The queues between a port and the worker for files.
 pub struct Queues {
     /// Requests and reports to the worker.
-    pub notes: Sender<Note>,
+    pub messages: Sender<PortMessage>,
     /// Copies of the parameters that the worker returns.
     pub returned: Receiver<ParameterCopy>,
 }
@@ -56,7 +56,7 @@ struct ProgramActions<'a> {
     axis: Axis,
     cycle: u64,
     program: &'a mut Program,
-    notes: &'a Sender<Note>,
+    messages: &'a Sender<PortMessage>,
     spare: &'a mut Option<Vec<f64>>,
     changed: &'a mut u64,
 }
@@ -68,7 +68,7 @@ impl ParameterActions for ProgramActions<'_> {
         if self.program.set(place, value).is_ok() {
             *self.changed += 1;
             // A full queue loses a message alone; the counter stays right.
-            let _ = self.notes.try_send(Note::Changed { axis, cycle, place, value });
+            let _ = self.messages.try_send(PortMessage::Changed { axis, cycle, place, value });
         }
     }
 
@@ -78,11 +78,11 @@ impl ParameterActions for ProgramActions<'_> {
         };
         copy.clear();
         copy.extend_from_slice(values);
-        match self.notes.try_send(Note::Store { axis: self.axis, values: copy }) {
+        match self.messages.try_send(PortMessage::Store { axis: self.axis, values: copy }) {
             Ok(()) => true,
             Err(
-                TrySendError::Full(Note::Store { values, .. })
-                | TrySendError::Disconnected(Note::Store { values, .. }),
+                TrySendError::Full(PortMessage::Store { values, .. })
+                | TrySendError::Disconnected(PortMessage::Store { values, .. }),
             ) => {
                 *self.spare = Some(values);
                 false
@@ -92,7 +92,7 @@ impl ParameterActions for ProgramActions<'_> {
     }
 
     fn load(&mut self) -> bool {
-        self.notes.try_send(Note::Load { axis: self.axis }).is_ok()
+        self.messages.try_send(PortMessage::Load { axis: self.axis }).is_ok()
     }
 }
 
@@ -147,7 +147,7 @@ impl Port {
         })
     }
 
-    /// What it counted since the start.
+    /// Counters since the start.
     pub fn counters(&self) -> PortCounters {
         let daq_dropped = self.counters.daq_dropped + self.slave.daq.dropped;
         PortCounters { slave: self.slave.counters, daq_dropped, ..self.counters }
@@ -158,10 +158,10 @@ impl Port {
         let (axis, cycle) = (self.axis, self.cycle);
         let after = &self.slave.counters;
         if after.unlocked > before.unlocked {
-            let _ = self.queues.notes.try_send(Note::Unlocked { axis, cycle });
+            let _ = self.queues.messages.try_send(PortMessage::Unlocked { axis, cycle });
         }
         if after.wrong_keys > before.wrong_keys {
-            let _ = self.queues.notes.try_send(Note::WrongKey { axis, cycle });
+            let _ = self.queues.messages.try_send(PortMessage::WrongKey { axis, cycle });
         }
     }
 
@@ -203,7 +203,8 @@ impl CalibrationPort for Port {
         command: &ValveCommand,
     ) {
         let record = controller.record(cycle, sensors, command);
-        let signals = signals::sample(&View { ready: controller.program.ready(), sensors, record });
+        let signals =
+            signals::sample(&CycleData { input: controller.program.algorithm_input(), sensors, record });
         self.slave.cycle(cycle, &signals, controller.program.values());
         self.cycle = cycle;
         self.daq_budget = self.slave.daq.per_cycle;
@@ -222,7 +223,7 @@ impl CalibrationPort for Port {
                 axis: self.axis,
                 cycle: self.cycle,
                 program: &mut *program,
-                notes: &self.queues.notes,
+                messages: &self.queues.messages,
                 spare: &mut self.spare,
                 changed: &mut self.counters.changed,
             };

@@ -3,7 +3,7 @@
 //! A signal is a number of the cycle that was just answered, in SI. XCP carries it as a float of four bytes or a count, so that
 //! it fits a DAQ packet whole; the trigger buffer keeps all eight bytes.
 
-use algorithms::algorithm::Ready;
+use algorithms::algorithm::AlgorithmInput;
 use axis_control::axis::AxisRecord;
 use protocol::frames::{DRIVE_CHAIN_STATUS, Sensors, SignalSpec};
 use settings::parameters::Parameter;
@@ -51,9 +51,9 @@ impl Format {
 }
 
 /// The data of a cycle that signals are taken from.
-pub(crate) struct View<'a> {
-    /// Inputs of its program.
-    pub(crate) ready: &'a Ready,
+pub(crate) struct CycleData<'a> {
+    /// Input of its algorithm.
+    pub(crate) input: &'a AlgorithmInput,
     pub(crate) sensors: &'a Sensors,
     /// The row of its record.
     pub(crate) record: AxisRecord,
@@ -66,10 +66,15 @@ pub(crate) struct Signal {
     pub(crate) format: Format,
     /// Names of its values, for one that is a state.
     pub(crate) values: &'static [&'static str],
-    of: fn(&View<'_>) -> f64,
+    of: fn(&CycleData<'_>) -> f64,
 }
 
-const fn count(name: &'static str, most: f64, meaning: &'static str, of: fn(&View<'_>) -> f64) -> Signal {
+const fn count(
+    name: &'static str,
+    most: f64,
+    meaning: &'static str,
+    of: fn(&CycleData<'_>) -> f64,
+) -> Signal {
     let about = Parameter::new((name, ""), [0.0, most], 0.0, meaning).whole();
     Signal { about, format: Format::Long, values: &[], of }
 }
@@ -78,7 +83,7 @@ const fn number(
     name: &'static str,
     (unit, range): (&'static str, [f64; 2]),
     meaning: &'static str,
-    of: fn(&View<'_>) -> f64,
+    of: fn(&CycleData<'_>) -> f64,
 ) -> Signal {
     let about = Parameter::new((name, unit), range, 0.0, meaning);
     Signal { about, format: Format::Float, values: &[], of }
@@ -88,7 +93,7 @@ const fn state(
     name: &'static str,
     values: &'static [&'static str],
     meaning: &'static str,
-    of: fn(&View<'_>) -> f64,
+    of: fn(&CycleData<'_>) -> f64,
 ) -> Signal {
     let most = values.len() as f64 - 1.0;
     let about = Parameter::new((name, ""), [0.0, most], 0.0, meaning).whole();
@@ -108,50 +113,50 @@ pub const COUNT: usize = SIGNALS.len();
 
 /// The table of signals: kind, name, range or values, meaning, and what it is in the data of a cycle.
 macro_rules! signals {
-    ($view:ident: $($kind:ident($name:literal, $scale:expr, $meaning:literal) = $of:expr;)*) => {
-        [$($kind($name, $scale, $meaning, |$view| $of)),*]
+    ($data:ident: $($kind:ident($name:literal, $scale:expr, $meaning:literal) = $of:expr;)*) => {
+        [$($kind($name, $scale, $meaning, |$data| $of)),*]
     };
 }
 
 /// All signals; a place in this table is what the trigger buffer calls a source or a channel.
-pub(crate) static SIGNALS: [Signal; 24] = signals! { view:
-    count("cycle", 4_294_967_295.0, "the rig's cycle, 1 ms each") = view.record.cycle as f64;
+pub(crate) static SIGNALS: [Signal; 24] = signals! { data:
+    count("cycle", 4_294_967_295.0, "the rig's cycle, 1 ms each") = data.record.cycle as f64;
     number("sensor_position_m", ("m", [0.0, 0.5]), "position as the sensor told it, rig coordinates") =
-        view.sensors.position_m;
+        data.sensors.position_m;
     number("sensor_force_n", ("N", [-2000.0, 2000.0]), "force as the sensor told it, compression positive") =
-        view.sensors.force_n;
+        data.sensors.force_n;
     number("sensor_pressure_a_pa", ("Pa", [0.0, 1e6]), "absolute pressure of the cap side as the sensor told it") =
-        view.sensors.pressure_a_pa;
+        data.sensors.pressure_a_pa;
     number("sensor_pressure_b_pa", ("Pa", [0.0, 1e6]), "absolute pressure of the rod side as the sensor told it") =
-        view.sensors.pressure_b_pa;
-    number("position_m", ("m", [-0.1, 0.6]), "position less the matched offset, rig coordinates") = view.record.position_m;
-    number("velocity_m_per_s", ("m/s", [-10.0, 10.0]), "its rate, filtered") = view.record.velocity_m_per_s;
+        data.sensors.pressure_b_pa;
+    number("position_m", ("m", [-0.1, 0.6]), "position less the matched offset, rig coordinates") = data.record.position_m;
+    number("velocity_m_per_s", ("m/s", [-10.0, 10.0]), "its rate, filtered") = data.record.velocity_m_per_s;
     number("extension_acceleration_m_per_s2", ("m/s^2", [-1000.0, 1000.0]),
-        "acceleration of the rod, filtered, positive as it extends") = view.ready.acceleration_m_per_s2;
-    number("force_n", ("N", [-2000.0, 2000.0]), "force, filtered") = view.ready.force_n;
-    number("pressure_a_pa", ("Pa", [0.0, 1e6]), "absolute pressure of the cap side, filtered") = view.ready.pressure_a_pa;
-    number("pressure_b_pa", ("Pa", [0.0, 1e6]), "absolute pressure of the rod side, filtered") = view.ready.pressure_b_pa;
+        "acceleration of the rod, filtered, positive as it extends") = data.input.acceleration_m_per_s2;
+    number("force_n", ("N", [-2000.0, 2000.0]), "force, filtered") = data.input.force_n;
+    number("pressure_a_pa", ("Pa", [0.0, 1e6]), "absolute pressure of the cap side, filtered") = data.input.pressure_a_pa;
+    number("pressure_b_pa", ("Pa", [0.0, 1e6]), "absolute pressure of the rod side, filtered") = data.input.pressure_b_pa;
     number("supply_pressure_pa", ("Pa", [0.0, 1e6]), "absolute pressure of the supply as the rig tells it") =
-        view.ready.supply_pressure_pa;
+        data.input.supply_pressure_pa;
     number("set_position_m", ("m", [-0.1, 0.6]), "position asked for; 0 while none is, see asked") =
-        view.record.set_position.map_or(0.0, |point| point.position_m);
+        data.record.set_position.map_or(0.0, |point| point.position_m);
     number("set_velocity_m_per_s", ("m/s", [-10.0, 10.0]), "its rate; 0 while none is asked for") =
-        view.record.set_position.map_or(0.0, |point| point.velocity_m_per_s);
+        data.record.set_position.map_or(0.0, |point| point.velocity_m_per_s);
     number("set_force_n", ("N", [-2000.0, 2000.0]), "force asked for; 0 while none is, see asked") =
-        view.record.set_force.map_or(0.0, |point| point.force_n);
+        data.record.set_force.map_or(0.0, |point| point.force_n);
     number("wanted_velocity_m_per_s", ("m/s", [-100.0, 100.0]),
-        "velocity that the algorithm wants, positive as the rod extends") = view.record.wanted_velocity_m_per_s;
+        "velocity that the algorithm wants, positive as the rod extends") = data.record.wanted_velocity_m_per_s;
     number("applied_velocity_m_per_s", ("m/s", [-100.0, 100.0]), "what the valve can do of it") =
-        view.ready.applied_velocity_m_per_s;
-    number("opening", ("", [-1.0, 1.0]), "valve opening sent") = view.record.opening;
-    state("enabled", NO_YES, "the valve is asked to act") = f64::from(u8::from(view.record.enabled));
-    state("main_chain", names(0), "state of the main chain") = f64::from(view.record.main.raw());
-    state("force_chain", names(1), "state of the force chain") = f64::from(view.record.force_chain.raw());
-    state("matching_chain", names(2), "state of the matching chain") = f64::from(view.record.matching.raw());
+        data.input.applied_velocity_m_per_s;
+    number("opening", ("", [-1.0, 1.0]), "valve opening sent") = data.record.opening;
+    state("enabled", NO_YES, "the valve is asked to act") = f64::from(u8::from(data.record.enabled));
+    state("main_chain", names(0), "state of the main chain") = f64::from(data.record.main.raw());
+    state("force_chain", names(1), "state of the force chain") = f64::from(data.record.force_chain.raw());
+    state("matching_chain", names(2), "state of the matching chain") = f64::from(data.record.matching.raw());
     state("emergency_stop_chain", names(3), "state of the emergency stop chain") =
-        f64::from(view.record.emergency_stop.raw());
+        f64::from(data.record.emergency_stop.raw());
     state("asked", &["nothing", "position", "force"], "what is asked of the axis") =
-        match (view.record.set_position, view.record.set_force) {
+        match (data.record.set_position, data.record.set_force) {
             (Some(_), _) => 1.0,
             (None, Some(_)) => 2.0,
             (None, None) => 0.0,
@@ -159,8 +164,8 @@ pub(crate) static SIGNALS: [Signal; 24] = signals! { view:
 };
 
 /// All signals of a cycle, in the order of [`SIGNALS`].
-pub(crate) fn sample(view: &View<'_>) -> [f64; COUNT] {
-    std::array::from_fn(|place| (SIGNALS[place].of)(view))
+pub(crate) fn sample(data: &CycleData<'_>) -> [f64; COUNT] {
+    std::array::from_fn(|place| (SIGNALS[place].of)(data))
 }
 
 #[cfg(test)]

@@ -1,18 +1,18 @@
-//! What an axis heard since its last answer: partner, emergency stops, console, set-points by hand.
+//! Frames that an axis received since its last answer: partner, emergency stops, console, set-points by hand.
 
 use crate::chains::{Console, Partner};
 use nominal::Axis;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, HandSetPoint, HandSetPointAxis};
 
 pub(super) struct Received {
-    /// The axis that hears.
+    /// The receiving axis.
     axis: Axis,
     experiment: u8,
     pub(super) partner: Partner,
-    partner_spoke: bool,
+    partner_status_received: bool,
     pub(super) console: Console,
     pub(super) stop: Option<EmergencyStopReason>,
-    pub(super) hand: Option<HandSetPoint>,
+    pub(super) hand_set_point: Option<HandSetPoint>,
     answered: Option<u64>,
 }
 
@@ -23,20 +23,20 @@ impl Received {
             axis,
             experiment,
             partner: Partner::default(),
-            partner_spoke: false,
+            partner_status_received: false,
             console: Console::default(),
             stop: None,
-            hand: None,
+            hand_set_point: None,
             answered: None,
         }
     }
 
-    /// Takes a frame; those of this axis are of another controller and nothing to go by.
+    /// Processes a frame; those of this axis come from another controller and are ignored.
     pub(super) fn take(&mut self, frame: &Frame) {
         match (self.axis, frame) {
             (Axis::Load, Frame::DriveChainStatus(status)) | (Axis::Drive, Frame::LoadChainStatus(status)) => {
                 self.partner.status = Some(*status);
-                self.partner_spoke = true;
+                self.partner_status_received = true;
             }
             (Axis::Load, Frame::DriveChainValues(values)) | (Axis::Drive, Frame::LoadChainValues(values)) => {
                 self.partner.values = Some(*values);
@@ -49,7 +49,7 @@ impl Received {
                 self.take_stop(stop);
             }
             (_, Frame::RunControl(control)) => self.console.take_run_control(control, self.experiment),
-            (axis, Frame::HandSetPoint(hand)) if axis == axis_of(hand) => self.hand = Some(*hand),
+            (axis, Frame::HandSetPoint(hand)) if axis == axis_of(hand) => self.hand_set_point = Some(*hand),
             _ => {}
         }
     }
@@ -60,14 +60,14 @@ impl Received {
         }
     }
 
-    /// Notes when the partner was heard. Cycles that the rig skipped, or that this process missed, are no silence of its: it
-    /// had nothing to answer, or nobody listened.
-    pub(super) fn listen(&mut self, cycle: u64) {
+    /// Updates the cycle in which the partner was received last. Cycles that the rig skipped or that this process missed do not
+    /// count as silence of the partner: it had nothing to answer, or its frames were not received.
+    pub(super) fn update_partner_age(&mut self, cycle: u64) {
         let missed = self.answered.map_or(0, |last| cycle.saturating_sub(last + 1));
         self.answered = Some(cycle);
         let received = &mut self.partner.received;
         *received = received.map(|received| received + missed);
-        if std::mem::take(&mut self.partner_spoke) {
+        if std::mem::take(&mut self.partner_status_received) {
             *received = Some(cycle);
         }
     }

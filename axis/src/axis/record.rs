@@ -1,4 +1,4 @@
-//! What an axis hands over in a cycle: to the bus, to a person, to the record.
+//! Outputs of an axis in a cycle: frames for the bus, an event for people, a row of the record.
 //!
 //! The columns of the record, `controller-drive.csv` and `controller-load.csv`, stand here: who writes the tables, and who makes
 //! figures of the rows in memory, goes through [`AxisRecord::CHAINS`] and [`AxisRecord::NUMBERS`].
@@ -112,7 +112,7 @@ impl AxisController {
     pub fn record(&self, cycle: u64, sensors: &Sensors, command: &ValveCommand) -> AxisRecord {
         let geometry = self.program.geometry();
         let status = self.status();
-        let asked = self.asked.as_ref();
+        let request = self.request.as_ref();
         AxisRecord {
             axis: self.axis,
             cycle,
@@ -120,12 +120,17 @@ impl AxisController {
             force_chain: status.force_chain,
             matching: status.matching_chain,
             emergency_stop: status.emergency_stop_chain,
-            set_position: asked.filter(|_| self.work.is_position()).map(|asked| asked.demand.position),
-            set_force: asked.filter(|_| !self.work.is_position()).map(|asked| asked.demand.force),
+            set_position: request
+                .filter(|_| self.demand_generator.is_position())
+                .map(|request| request.demand.position),
+            set_force: request
+                .filter(|_| !self.demand_generator.is_position())
+                .map(|request| request.demand.force),
             position_m: sensors.position_m - geometry.offset_m,
-            velocity_m_per_s: geometry.direction() * self.program.ready().velocity_m_per_s,
+            velocity_m_per_s: geometry.direction() * self.program.algorithm_input().velocity_m_per_s,
             force_n: sensors.force_n,
-            wanted_velocity_m_per_s: asked.map_or(0.0, |asked| self.program.wanted_m_per_s(asked.hand)),
+            wanted_velocity_m_per_s: request
+                .map_or(0.0, |request| self.program.wanted_m_per_s(request.algorithm)),
             opening: command.opening,
             enabled: command.enable,
         }

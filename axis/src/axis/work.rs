@@ -1,4 +1,4 @@
-//! What an axis does in each phase of the main chain: positioning, pressing, or nothing.
+//! Request of an axis in each phase of the main chain: a position, a force, or a shut valve.
 //!
 //! ```text
 //!   phase               position              force
@@ -15,16 +15,16 @@
 //! the ramp to the force, until it is done that is a fault, also with a force of zero: nothing was pressed, and nobody shall
 //! take it for an experiment.
 
-use super::by_hand::ByHand;
-use crate::chains::force::{ForceAsked, ForceChain, ForceInputs};
+use super::by_hand::OperatorSetPoint;
+use crate::chains::force::{ForceChain, ForceInputs, ForceRequest};
 use crate::chains::main::{MainConfig, MainOutput, Phase};
 use crate::chains::matching::{MatchingChain, MatchingInputs};
 use crate::chains::settled::ControlError;
 use crate::chains::{Fault, Partner};
-use crate::experiment::{ByHandLimits, Prepare};
-use crate::program::{Demand, Hand, Program, Task};
-use crate::set_point::{ForceSetPoint, ForceSource, Motion, SetPoint, SmoothWay};
-use algorithms::algorithm::Ready;
+use crate::experiment::{OperatorLimits, Prepare};
+use crate::program::{ActiveAlgorithm, Demand, Program, Task};
+use crate::set_point::{ForceSetPoint, ForceSource, Motion, SetPoint, SmoothTransition};
+use algorithms::algorithm::AlgorithmInput;
 use protocol::frames::{ForceChainState, HandSetPoint, MainChainState, MatchingChainState, RigStatus};
 
 #[derive(Clone, Debug)]
@@ -32,8 +32,8 @@ pub enum Plan {
     Shut,
     Position {
         motion: Motion,
-        /// What positions given by hand keep to; `None`: none are followed.
-        by_hand: Option<ByHandLimits>,
+        /// Limits of positions given by hand; `None`: none are followed.
+        by_hand: Option<OperatorLimits>,
     },
     Force(ForcePlan),
 }
@@ -47,75 +47,80 @@ pub struct ForcePlan {
     pub prepare: Vec<Prepare>,
     /// It gives way to a hand during the experiment, instead of pressing.
     pub manual: bool,
-    /// What forces given by hand keep to; `None`: none are followed.
-    pub by_hand: Option<ByHandLimits>,
+    /// Limits of forces given by hand; `None`: none are followed.
+    pub by_hand: Option<OperatorLimits>,
 }
 
+/// Set-points of a cycle, and the algorithm that shall follow them.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Asked {
+pub(super) struct ControlRequest {
     pub(super) demand: Demand,
-    pub(super) hand: Hand,
+    pub(super) algorithm: ActiveAlgorithm,
 }
 
-pub(super) struct Seen<'a> {
+/// Inputs of the generator in a cycle.
+pub(super) struct CycleInputs<'a> {
     pub(super) cycle: u64,
     pub(super) rig: Option<&'a RigStatus>,
     pub(super) partner: &'a Partner,
     pub(super) still: bool,
-    pub(super) hand: Option<HandSetPoint>,
+    pub(super) hand_set_point: Option<HandSetPoint>,
 }
 
-pub(super) enum Work {
+/// Derives the request of each cycle from the phase of the main chain.
+pub(super) enum DemandGenerator {
     Shut,
-    Position { motion: Motion, start_m: f64, by_hand: Option<ByHand> },
-    Force(Box<Pressing>),
+    Position { motion: Motion, start_m: f64, by_hand: Option<OperatorSetPoint> },
+    Force(Box<ForceControl>),
 }
 
-pub(super) struct Pressing {
+/// Force control of an axis: its chains, and how far it has prepared.
+pub(super) struct ForceControl {
     plan: ForcePlan,
-    by_hand: Option<ByHand>,
-    force: ForceChain,
-    matching: MatchingChain,
-    step: usize,
+    by_hand: Option<OperatorSetPoint>,
+    force_chain: ForceChain,
+    matching_chain: MatchingChain,
+    /// Index in [`ForcePlan::prepare`].
+    prepare_step: usize,
     fault: Option<Fault>,
 }
 
-impl Work {
+impl DemandGenerator {
     pub(super) fn new(plan: Plan, main: &MainConfig) -> Self {
         match plan {
             Plan::Shut => Self::Shut,
             Plan::Position { motion, by_hand } => {
                 let start_m = main.start_m.unwrap_or(motion.start_m());
-                Self::Position { motion, start_m, by_hand: by_hand.map(ByHand::new) }
+                Self::Position { motion, start_m, by_hand: by_hand.map(OperatorSetPoint::new) }
             }
-            Plan::Force(plan) => Self::Force(Box::new(Pressing {
-                by_hand: plan.by_hand.map(ByHand::new),
+            Plan::Force(plan) => Self::Force(Box::new(ForceControl {
+                by_hand: plan.by_hand.map(OperatorSetPoint::new),
                 plan,
-                force: ForceChain::default(),
-                matching: MatchingChain::default(),
-                step: 0,
+                force_chain: ForceChain::default(),
+                matching_chain: MatchingChain::default(),
+                prepare_step: 0,
                 fault: None,
             })),
         }
     }
 
-    /// What is asked in this cycle; `None` shuts the valve.
-    pub(super) fn ask(
+    /// The request of this cycle; `None` shuts the valve.
+    pub(super) fn request(
         &mut self,
         output: &MainOutput,
-        seen: &Seen<'_>,
+        inputs: &CycleInputs<'_>,
         program: &mut Program,
-    ) -> Option<Asked> {
+    ) -> Option<ControlRequest> {
         match self {
             Self::Shut => None,
             Self::Position { motion, start_m, by_hand } => {
                 if let Some(by_hand) = by_hand {
-                    by_hand.hear(output.phase, seen.hand.map(|hand| hand.position_m));
+                    by_hand.set_target(output.phase, inputs.hand_set_point.map(|hand| hand.position_m));
                 }
                 let position = match output.phase {
                     Phase::Shut => return None,
                     Phase::Approach { elapsed_s, from_m, duration_s } => {
-                        SmoothWay::new(from_m, *start_m, duration_s).at(elapsed_s).into()
+                        SmoothTransition::new(from_m, *start_m, duration_s).at(elapsed_s).into()
                     }
                     Phase::Prepare | Phase::RampForce { .. } | Phase::HoldStart => {
                         SetPoint::at_rest(*start_m)
@@ -125,26 +130,26 @@ impl Work {
                         by_hand.as_mut().map_or(planned, |hand| hand.at(elapsed_s, planned.into()).into())
                     }
                     Phase::HoldEnd => {
-                        let led_to_m = by_hand.as_ref().and_then(ByHand::end);
-                        SetPoint::at_rest(led_to_m.unwrap_or(motion.end_m()))
+                        let operator_m = by_hand.as_ref().and_then(OperatorSetPoint::end);
+                        SetPoint::at_rest(operator_m.unwrap_or(motion.end_m()))
                     }
                 };
                 let demand = Demand { position, force: ForceSetPoint::at_rest(0.0) };
-                Some(Asked { demand, hand: Hand::User })
+                Some(ControlRequest { demand, algorithm: ActiveAlgorithm::User })
             }
-            Self::Force(pressing) => pressing.ask(output, seen, program),
+            Self::Force(control) => control.request(output, inputs, program),
         }
     }
 
-    pub(super) fn error(&self, demand: &Demand, ready: &Ready) -> ControlError {
+    pub(super) fn error(&self, demand: &Demand, input: &AlgorithmInput) -> ControlError {
         match self {
             Self::Shut => ControlError::None,
             // Both in the axis's extension, where only the difference counts.
             Self::Position { .. } => {
-                ControlError::Position { error_m: ready.set_position_m - ready.position_m }
+                ControlError::Position { error_m: input.set_position_m - input.position_m }
             }
             Self::Force(_) => ControlError::Force {
-                error_n: demand.force.force_n - ready.force_n,
+                error_n: demand.force.force_n - input.force_n,
                 set_force_n: demand.force.force_n,
             },
         }
@@ -156,21 +161,21 @@ impl Work {
 
     pub(super) fn prepared(&self) -> bool {
         match self {
-            Self::Force(pressing) => pressing.step >= pressing.plan.prepare.len(),
+            Self::Force(control) => control.prepare_step >= control.plan.prepare.len(),
             _ => true,
         }
     }
 
     pub(super) fn fault(&mut self) -> Option<Fault> {
         match self {
-            Self::Force(pressing) => pressing.fault.take(),
+            Self::Force(control) => control.fault.take(),
             _ => None,
         }
     }
 
     pub(super) fn force_chain(&self, main: MainChainState) -> ForceChainState {
         match self {
-            Self::Force(pressing) => pressing.force.entered.state,
+            Self::Force(control) => control.force_chain.entered.state,
             _ if main == MainChainState::Done => ForceChainState::Done,
             _ => ForceChainState::Idle,
         }
@@ -178,84 +183,92 @@ impl Work {
 
     pub(super) fn matching_chain(&self) -> MatchingChainState {
         match self {
-            Self::Force(pressing) => pressing.matching.entered.state,
+            Self::Force(control) => control.matching_chain.entered.state,
             _ => MatchingChainState::Idle,
         }
     }
 
     pub(super) fn restart(&mut self) {
-        if let Self::Force(pressing) = self {
-            pressing.force.restart(0);
-            pressing.matching.restart(0);
-            pressing.plan.source.reset();
-            (pressing.step, pressing.fault) = (0, None);
+        if let Self::Force(control) = self {
+            control.force_chain.restart(0);
+            control.matching_chain.restart(0);
+            control.plan.source.reset();
+            (control.prepare_step, control.fault) = (0, None);
         }
     }
 }
 
-impl Pressing {
-    fn ask(&mut self, output: &MainOutput, seen: &Seen<'_>, program: &mut Program) -> Option<Asked> {
-        let linked = seen.rig.is_some_and(|rig| rig.linked);
+impl ForceControl {
+    fn request(
+        &mut self,
+        output: &MainOutput,
+        inputs: &CycleInputs<'_>,
+        program: &mut Program,
+    ) -> Option<ControlRequest> {
+        let linked = inputs.rig.is_some_and(|rig| rig.linked);
         if let Some(by_hand) = &mut self.by_hand {
-            by_hand.hear(output.phase, seen.hand.map(|hand| hand.force_n));
+            by_hand.set_target(output.phase, inputs.hand_set_point.map(|hand| hand.force_n));
         }
         if matches!(output.phase, Phase::Approach { .. } | Phase::Shut) {
-            self.step = 0;
+            self.prepare_step = 0;
             self.plan.source.reset();
         }
-        let asked = self.force_asked(output.phase, linked);
+        let request = self.force_request(output.phase, linked);
         self.fault = self.fault.or(self.not_linked(output.state, linked));
-        let matching = asked != ForceAsked::Idle && self.preparing(output.phase) == Some(Prepare::Match);
-        self.advance_matching(matching, linked, seen, program);
-        let ready = *program.ready();
-        let chain = self.force.advance(
+        let matching = request != ForceRequest::Idle && self.preparing(output.phase) == Some(Prepare::Match);
+        self.advance_matching(matching, linked, inputs, program);
+        let measured = *program.algorithm_input();
+        let chain = self.force_chain.advance(
             &ForceInputs {
-                cycle: seen.cycle,
-                asked,
-                force_n: ready.force_n,
-                velocity_m_per_s: ready.velocity_m_per_s,
+                cycle: inputs.cycle,
+                request,
+                force_n: measured.force_n,
+                velocity_m_per_s: measured.velocity_m_per_s,
             },
             program.task(Task::ForceChain),
         );
         self.fault = self.fault.or(chain.fault);
         let relieving = self.preparing(output.phase) == Some(Prepare::Relieve);
         if relieving && chain.relieved {
-            self.step += 1;
+            self.prepare_step += 1;
         }
-        match asked {
-            ForceAsked::Idle => None,
-            ForceAsked::Relieve | ForceAsked::Manual => {
-                program.give_way(&chain);
+        match request {
+            ForceRequest::Idle => None,
+            ForceRequest::Relieve | ForceRequest::Manual => {
+                program.set_chain_output(&chain);
                 let force = ForceSetPoint::at_rest(chain.set_force_n.unwrap_or(0.0));
-                Some(Asked { demand: self.demand(force, program), hand: Hand::ForceChain })
+                Some(ControlRequest {
+                    demand: self.demand(force, program),
+                    algorithm: ActiveAlgorithm::ForceChain,
+                })
             }
-            ForceAsked::InitialRamp | ForceAsked::LoadProfile | ForceAsked::Done => {
+            ForceRequest::InitialRamp | ForceRequest::LoadProfile | ForceRequest::Done => {
                 let force = self.set_point(output.phase, program);
-                Some(Asked { demand: self.demand(force, program), hand: Hand::User })
+                Some(ControlRequest { demand: self.demand(force, program), algorithm: ActiveAlgorithm::User })
             }
         }
     }
 
-    fn force_asked(&self, phase: Phase, linked: bool) -> ForceAsked {
+    fn force_request(&self, phase: Phase, linked: bool) -> ForceRequest {
         let by_hand = self.plan.manual && matches!(phase, Phase::Experiment { .. } | Phase::HoldEnd);
         match phase {
-            Phase::Shut => ForceAsked::Idle,
-            _ if by_hand => ForceAsked::Manual,
-            _ if !linked => ForceAsked::Idle,
-            Phase::Approach { .. } => ForceAsked::Manual,
-            Phase::Prepare => ForceAsked::Relieve,
+            Phase::Shut => ForceRequest::Idle,
+            _ if by_hand => ForceRequest::Manual,
+            _ if !linked => ForceRequest::Idle,
+            Phase::Approach { .. } => ForceRequest::Manual,
+            Phase::Prepare => ForceRequest::Relieve,
             // With no force to hold, before and after a manual mode, it gives way too.
-            _ if self.plan.manual => ForceAsked::Manual,
-            Phase::RampForce { .. } | Phase::HoldStart => ForceAsked::InitialRamp,
-            Phase::Experiment { .. } => ForceAsked::LoadProfile,
-            Phase::HoldEnd => ForceAsked::Done,
+            _ if self.plan.manual => ForceRequest::Manual,
+            Phase::RampForce { .. } | Phase::HoldStart => ForceRequest::InitialRamp,
+            Phase::Experiment { .. } => ForceRequest::LoadProfile,
+            Phase::HoldEnd => ForceRequest::Done,
         }
     }
 
     fn not_linked(&self, state: MainChainState, linked: bool) -> Option<Fault> {
         use MainChainState::{Experiment, FinalSettling, InitialForce, Preparing, Settling};
         let needed = match state {
-            Preparing => self.step < self.plan.prepare.len(),
+            Preparing => self.prepare_step < self.plan.prepare.len(),
             InitialForce | Settling | Experiment | FinalSettling => true,
             _ => false,
         };
@@ -263,24 +276,30 @@ impl Pressing {
     }
 
     fn preparing(&self, phase: Phase) -> Option<Prepare> {
-        self.plan.prepare.get(self.step).copied().filter(|_| phase == Phase::Prepare)
+        self.plan.prepare.get(self.prepare_step).copied().filter(|_| phase == Phase::Prepare)
     }
 
-    fn advance_matching(&mut self, asked: bool, linked: bool, seen: &Seen<'_>, program: &mut Program) {
+    fn advance_matching(
+        &mut self,
+        requested: bool,
+        linked: bool,
+        inputs: &CycleInputs<'_>,
+        program: &mut Program,
+    ) {
         let offset_m = program.geometry().offset_m;
-        let inputs = MatchingInputs {
-            cycle: seen.cycle,
-            asked,
+        let matching_inputs = MatchingInputs {
+            cycle: inputs.cycle,
+            requested,
             linked,
-            still: seen.still,
+            still: inputs.still,
             position_m: program.position_m() + offset_m,
-            partner: *seen.partner,
+            partner: *inputs.partner,
         };
-        let output = self.matching.advance(&inputs, program.task(Task::MatchingChain));
+        let output = self.matching_chain.advance(&matching_inputs, program.task(Task::MatchingChain));
         self.fault = self.fault.or(output.fault);
-        if asked && output.matched {
+        if requested && output.matched {
             program.set_offset(output.offset_m);
-            self.step += 1;
+            self.prepare_step += 1;
         }
     }
 
@@ -288,15 +307,15 @@ impl Pressing {
         let initial_n = self.plan.source.profile.initial_force_n();
         match phase {
             Phase::RampForce { elapsed_s } => {
-                SmoothWay::new(0.0, initial_n, self.plan.initial_ramp_s).at(elapsed_s).into()
+                SmoothTransition::new(0.0, initial_n, self.plan.initial_ramp_s).at(elapsed_s).into()
             }
             Phase::Experiment { elapsed_s } => {
                 let planned = self.plan.source.at(elapsed_s, &program.actual());
                 self.by_hand.as_mut().map_or(planned, |hand| hand.at(elapsed_s, planned.into()).into())
             }
             Phase::HoldEnd => {
-                let led_to_n = self.by_hand.as_ref().and_then(ByHand::end);
-                led_to_n.map_or_else(|| self.plan.source.end(), ForceSetPoint::at_rest)
+                let operator_n = self.by_hand.as_ref().and_then(OperatorSetPoint::end);
+                operator_n.map_or_else(|| self.plan.source.end(), ForceSetPoint::at_rest)
             }
             _ => ForceSetPoint::at_rest(initial_n),
         }

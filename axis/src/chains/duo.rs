@@ -1,8 +1,8 @@
-//! Two chains that talk to each other, for tests: what one says in a cycle the other sees in the next.
+//! Two axes that exchange their statuses, for tests: a status sent in a cycle is received in the next.
 //!
-//! Each is wired as in an axis controller, by the same [`Leading`].
+//! Each is wired as in an axis controller, by the same [`SupervisoryChains`].
 
-use super::leading::{Leading, LeadingInputs};
+use super::leading::{SupervisoryChains, SupervisoryInputs};
 use super::main::{AxisMeasurement, Lengths, MainConfig, MainOutput, Phase};
 use super::settled::ControlError;
 use super::{AfterStop, Console, Fault, Partner};
@@ -12,29 +12,31 @@ use protocol::frames::{
 
 pub(super) const SUPPLY_PA: f64 = 7e5;
 
-pub(super) struct One {
-    pub(super) leading: Leading,
+/// The supervisory chains of an axis, with inputs that a test sets.
+pub(super) struct SimulatedAxis {
+    pub(super) supervisory: SupervisoryChains,
     pub(super) position_m: f64,
     pub(super) error: ControlError,
     pub(super) prepared: bool,
     pub(super) sensors: bool,
-    /// Its status frames reach the other.
+    /// The partner receives its status frames.
     pub(super) received: bool,
     pub(super) alive: bool,
     pub(super) fault: Option<Fault>,
     partner: Partner,
     pub(super) output: Option<MainOutput>,
     experiment: u8,
-    pub(super) seen: Vec<(u64, MainChainState)>,
+    /// Each state with the cycle in which it was entered.
+    pub(super) state_log: Vec<(u64, MainChainState)>,
     /// It holds the emergency stop, as the rig knows it.
     holds: bool,
 }
 
-impl One {
+impl SimulatedAxis {
     pub(super) fn new(config: MainConfig) -> Self {
         Self {
             experiment: config.experiment,
-            leading: Leading::new(config, SUPPLY_PA),
+            supervisory: SupervisoryChains::new(config, SUPPLY_PA),
             position_m: 0.1,
             error: ControlError::None,
             prepared: true,
@@ -44,13 +46,13 @@ impl One {
             fault: None,
             partner: Partner::default(),
             output: None,
-            seen: Vec::new(),
+            state_log: Vec::new(),
             holds: false,
         }
     }
 
     pub(super) fn state(&self) -> MainChainState {
-        self.leading.main.entered.state
+        self.supervisory.main.entered.state
     }
 
     pub(super) fn fault(&self) -> Option<Fault> {
@@ -58,14 +60,14 @@ impl One {
     }
 
     pub(super) fn stop_state(&self) -> EmergencyStopChainState {
-        self.leading.stop.state()
+        self.supervisory.stop.state()
     }
 
     fn status(&self) -> Option<ChainStatus> {
         let output = self.output?;
         Some(ChainStatus {
             main_chain: output.state,
-            emergency_stop_chain: self.leading.stop.state(),
+            emergency_stop_chain: self.supervisory.stop.state(),
             ok: output.ok,
             experiment: self.experiment,
             repetition: output.repetition as u8,
@@ -86,7 +88,7 @@ impl One {
         }
         let measurement =
             self.sensors.then_some(AxisMeasurement { position_m: self.position_m, error: self.error });
-        let output = self.leading.advance(&LeadingInputs {
+        let output = self.supervisory.advance(&SupervisoryInputs {
             cycle,
             rig: Some(rig),
             measurement,
@@ -103,31 +105,31 @@ impl One {
         if self.stop_state() != EmergencyStopChainState::Ready {
             assert_eq!(output.phase, Phase::Shut, "an emergency stop shuts in its cycle");
         }
-        if self.seen.last().is_none_or(|(_, state)| *state != output.state) {
-            self.seen.push((cycle, output.state));
+        if self.state_log.last().is_none_or(|(_, state)| *state != output.state) {
+            self.state_log.push((cycle, output.state));
         }
         self.output = Some(output);
-        let sent = self.leading.stop.frame_due(cycle)?;
+        let sent = self.supervisory.stop.frame_due(cycle)?;
         self.holds = !sent.release;
         (!sent.release).then_some(sent.reason)
     }
 }
 
 /// Two axes, the rig's emergency stop, and the console.
-pub(super) struct Duo {
-    pub(super) axes: [One; 2],
+pub(super) struct AxisPair {
+    pub(super) axes: [SimulatedAxis; 2],
     pub(super) cycle: u64,
-    /// Said in the next cycle only.
+    /// Input of the next cycle only.
     pub(super) console: Console,
     pub(super) console_holds: bool,
-    /// What each sent in the cycle before.
+    /// Emergency stop that each sent in the cycle before.
     sent: [Option<EmergencyStopReason>; 2],
 }
 
-impl Duo {
+impl AxisPair {
     pub(super) fn new(config: &MainConfig) -> Self {
         Self {
-            axes: [0, 1].map(|_| One::new(config.clone())),
+            axes: [0, 1].map(|_| SimulatedAxis::new(config.clone())),
             cycle: 0,
             console: Console::default(),
             console_holds: false,
@@ -139,7 +141,7 @@ impl Duo {
         self.console_holds || self.axes.iter().any(|axis| axis.holds)
     }
 
-    /// One cycle of both; each sees what the other said in the cycle before.
+    /// One cycle of both; each sees what the other sent in the cycle before.
     pub(super) fn step(&mut self) {
         if self.console.release {
             self.console_holds = false;
@@ -153,17 +155,17 @@ impl Duo {
             ..RigStatus::default()
         };
         let console = std::mem::take(&mut self.console);
-        let said = [0, 1].map(|index| {
-            let one = &self.axes[index];
-            one.status().filter(|_| one.alive && one.received)
+        let statuses = [0, 1].map(|index| {
+            let axis = &self.axes[index];
+            axis.status().filter(|_| axis.alive && axis.received)
         });
         let sent = self.sent;
         for index in [0, 1] {
-            let one = &mut self.axes[index];
-            if let Some(status) = said[1 - index] {
-                one.partner = Partner { status: Some(status), values: None, received: Some(self.cycle) };
+            let axis = &mut self.axes[index];
+            if let Some(status) = statuses[1 - index] {
+                axis.partner = Partner { status: Some(status), values: None, received: Some(self.cycle) };
             }
-            self.sent[index] = one.advance(self.cycle, rig, sent[1 - index], console);
+            self.sent[index] = axis.advance(self.cycle, rig, sent[1 - index], console);
         }
         self.cycle += 1;
     }
@@ -180,7 +182,7 @@ impl Duo {
             }
             self.step();
         }
-        panic!("{state} was not reached: {:?} {:?}", self.axes[0].seen, self.axes[1].seen);
+        panic!("{state} was not reached: {:?} {:?}", self.axes[0].state_log, self.axes[1].state_log);
     }
 
     pub(super) fn states(&self) -> [MainChainState; 2] {

@@ -32,7 +32,7 @@
 //!
 //! To trip it from the console: `cansend can0 108#0100`. To end the run without an emergency stop: `cansend can0 160#0200`.
 
-use super::{AfterStop, Console, Entered, Fault, cycles, elapsed_s};
+use super::{AfterStop, Console, Fault, StateEntry, cycles, elapsed_s};
 use protocol::frames::{EmergencyStop, EmergencyStopChainState, EmergencyStopReason, RigStatus};
 
 /// Cycles between two frames of a stop that is held.
@@ -116,12 +116,12 @@ pub struct EmergencyStopChain {
     config: StopConfig,
     state: State,
     frames: Frames,
-    pub(crate) entered: Entered<EmergencyStopChainState, StopCause>,
+    pub(crate) entered: StateEntry<EmergencyStopChainState, StopCause>,
 }
 
 impl EmergencyStopChain {
     pub fn new(config: StopConfig) -> Self {
-        let entered = Entered { cycle: 0, state: EmergencyStopChainState::Ready, cause: StopCause::Began };
+        let entered = StateEntry { cycle: 0, state: EmergencyStopChainState::Ready, cause: StopCause::Began };
         Self { config, state: State::Ready, frames: Frames::None, entered }
     }
 
@@ -262,7 +262,7 @@ impl EmergencyStopChain {
             S::Recovering => State::Recovering { up_since: None },
             S::WaitingForStart => State::WaitingForStart,
         };
-        self.entered = Entered { cycle: now, state, cause };
+        self.entered = StateEntry { cycle: now, state, cause };
     }
 }
 

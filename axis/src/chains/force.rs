@@ -26,7 +26,7 @@
 //! within the friction must not be worked on; when moving, both would be felt in the hand. Movement begins with the velocity and
 //! ends with its mean: a rod that bounces within the gap of the linkage is fast at times and goes nowhere.
 
-use super::{CYCLE_S, Entered, Fault, cycles, elapsed_s};
+use super::{CYCLE_S, Fault, StateEntry, cycles, elapsed_s};
 use protocol::frames::ForceChainState;
 use settings::parameters::declare;
 
@@ -54,7 +54,7 @@ const MEAN_VELOCITY_S: f64 = 0.15;
 const STILL_SHARE: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ForceAsked {
+pub enum ForceRequest {
     /// Nothing: valve shut, or held still.
     #[default]
     Idle,
@@ -69,7 +69,7 @@ pub enum ForceAsked {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ForceInputs {
     pub cycle: u64,
-    pub asked: ForceAsked,
+    pub request: ForceRequest,
     pub force_n: f64,
     /// Velocity of this axis's rod, filtered, m/s.
     pub velocity_m_per_s: f64,
@@ -91,7 +91,7 @@ pub struct ForceOutput {
 pub enum ForceCause {
     /// The controller or the rig began.
     Began,
-    Asked(ForceAsked),
+    Requested(ForceRequest),
     LowForce,
     Moves,
     Still,
@@ -136,16 +136,16 @@ enum State {
 #[derive(Clone, Debug)]
 pub struct ForceChain {
     state: State,
-    asked: ForceAsked,
+    request: ForceRequest,
     /// Mean of the force, with the cycle of its last sample.
     mean: Option<Mean>,
-    pub(crate) entered: Entered<ForceChainState, ForceCause>,
+    pub(crate) entered: StateEntry<ForceChainState, ForceCause>,
 }
 
 impl Default for ForceChain {
     fn default() -> Self {
-        let entered = Entered { cycle: 0, state: ForceChainState::Idle, cause: ForceCause::Began };
-        Self { state: State::Idle, asked: ForceAsked::Idle, mean: None, entered }
+        let entered = StateEntry { cycle: 0, state: ForceChainState::Idle, cause: ForceCause::Began };
+        Self { state: State::Idle, request: ForceRequest::Idle, mean: None, entered }
     }
 }
 
@@ -160,7 +160,7 @@ impl ForceChain {
         if let Some((state, cause)) = self.decide(inputs, &numbers) {
             self.enter(state, cause, inputs.cycle);
         }
-        self.asked = inputs.asked;
+        self.request = inputs.request;
         self.output(&numbers)
     }
 
@@ -201,24 +201,24 @@ impl ForceChain {
 
     fn decide(&self, inputs: &ForceInputs, numbers: &Parameters) -> Option<(ForceChainState, ForceCause)> {
         use ForceChainState as S;
-        let asked = inputs.asked;
+        let request = inputs.request;
         if self.state == State::Fault {
-            return (asked == ForceAsked::Idle).then_some((S::Idle, ForceCause::Asked(asked)));
+            return (request == ForceRequest::Idle).then_some((S::Idle, ForceCause::Requested(request)));
         }
-        if asked != self.asked {
-            let state = match asked {
-                ForceAsked::Idle => S::Idle,
-                ForceAsked::Relieve | ForceAsked::Manual => S::Limited,
-                ForceAsked::InitialRamp => S::InitialRamp,
-                ForceAsked::LoadProfile => S::LoadProfile,
-                ForceAsked::Done => S::Done,
+        if request != self.request {
+            let state = match request {
+                ForceRequest::Idle => S::Idle,
+                ForceRequest::Relieve | ForceRequest::Manual => S::Limited,
+                ForceRequest::InitialRamp => S::InitialRamp,
+                ForceRequest::LoadProfile => S::LoadProfile,
+                ForceRequest::Done => S::Done,
             };
-            return Some((state, ForceCause::Asked(asked)));
+            return Some((state, ForceCause::Requested(request)));
         }
         let lasted = |since: Option<u64>, least_s: f64| {
             since.is_some_and(|since| inputs.cycle.saturating_sub(since) >= cycles(least_s))
         };
-        let relieving = asked == ForceAsked::Relieve;
+        let relieving = request == ForceRequest::Relieve;
         let too_long = |began: u64| {
             let late = relieving && elapsed_s(began, inputs.cycle) > numbers.relieve_timeout_s;
             late.then_some((S::Fault, ForceCause::TooLong))
@@ -242,9 +242,10 @@ impl ForceChain {
     }
 
     fn output(&self, numbers: &Parameters) -> ForceOutput {
-        let relieved = self.state == State::Done && self.asked == ForceAsked::Relieve;
+        let relieved = self.state == State::Done && self.request == ForceRequest::Relieve;
         let yields = relieved
-            || matches!(self.asked, ForceAsked::Relieve | ForceAsked::Manual) && self.state != State::Fault;
+            || matches!(self.request, ForceRequest::Relieve | ForceRequest::Manual)
+                && self.state != State::Fault;
         let limited = matches!(self.state, State::Limited { .. });
         let still = matches!(self.state, State::Standstill { .. }) || relieved;
         ForceOutput {
@@ -281,7 +282,7 @@ impl ForceChain {
             S::Done => State::Done,
             S::Fault => State::Fault,
         };
-        self.entered = Entered { cycle: now, state, cause };
+        self.entered = StateEntry { cycle: now, state, cause };
     }
 }
 

@@ -1,4 +1,5 @@
-//! Both chains that lead an axis, wired: emergency stop chain, main chain, and the trip by a fault, in this order each cycle.
+//! The supervisory chains of an axis, connected: emergency stop chain, main chain, and the trip by a fault, in this order each
+//! cycle.
 //!
 //! ```text
 //!   rig status, frames ──► emergency stop ──► main ──► what is asked
@@ -14,7 +15,7 @@ use super::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopReason, RigStatus};
 
 #[derive(Clone, Copy, Debug, Default)]
-pub struct LeadingInputs {
+pub struct SupervisoryInputs {
     pub cycle: u64,
     pub rig: Option<RigStatus>,
     /// `None` before the first sensors of this axis, and while they are lost.
@@ -28,15 +29,16 @@ pub struct LeadingInputs {
     pub fault: Option<Fault>,
 }
 
+/// Emergency stop chain and main chain of an axis.
 #[derive(Clone, Debug)]
-pub struct Leading {
+pub struct SupervisoryChains {
     pub(crate) main: MainChain,
     pub(crate) stop: EmergencyStopChain,
     partner_needed: bool,
     pub(crate) output: Option<MainOutput>,
 }
 
-impl Leading {
+impl SupervisoryChains {
     /// A main chain that waits for the rig, and an emergency stop chain that is ready.
     pub fn new(main: MainConfig, supply_pressure_pa: f64) -> Self {
         let stop = StopConfig { after_emergency_stop: main.after_emergency_stop, supply_pressure_pa };
@@ -49,8 +51,8 @@ impl Leading {
     }
 
     /// Moves both on by one edge at most, and trips for a fault that is new.
-    pub fn advance(&mut self, inputs: &LeadingInputs) -> MainOutput {
-        let LeadingInputs { cycle, rig, measurement, prepared, partner, frame, console, fault } = *inputs;
+    pub fn advance(&mut self, inputs: &SupervisoryInputs) -> MainOutput {
+        let SupervisoryInputs { cycle, rig, measurement, prepared, partner, frame, console, fault } = *inputs;
         let emergency_stop = self.stop.advance(&StopInputs {
             cycle,
             rig,
@@ -83,49 +85,49 @@ impl Leading {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chains::duo::{Duo, short};
+    use crate::chains::duo::{AxisPair, short};
     use crate::chains::settled::ControlError;
     use protocol::frames::{EmergencyStopChainState as E, MainChainState as S};
 
     const FAR: ControlError = ControlError::Position { error_m: 0.1 };
 
-    fn alone() -> Duo {
-        let mut duo = Duo::new(&MainConfig { partner_needed: false, ..short() });
-        duo.axes[1].alive = false;
-        duo
+    fn alone() -> AxisPair {
+        let mut pair = AxisPair::new(&MainConfig { partner_needed: false, ..short() });
+        pair.axes[1].alive = false;
+        pair
     }
 
     #[test]
     fn an_own_fault_is_released_by_a_person_and_the_run_begins_anew_to_its_end() {
-        let mut duo = alone();
-        duo.axes[0].error = FAR;
-        duo.run_to(S::Fault);
-        assert_eq!(duo.faults()[0], Some(Fault::SettlingTimeout));
-        duo.run(1500);
-        assert_eq!(duo.axes[0].stop_state(), E::WaitingForRelease);
-        duo.axes[0].error = ControlError::None;
-        duo.console.release = true;
-        duo.step();
-        duo.run(2);
-        assert_eq!(duo.axes[0].stop_state(), E::Recovering, "and the withdrawal is sent");
-        duo.run(210);
-        assert_eq!((duo.axes[0].stop_state(), duo.axes[0].state()), (E::Ready, S::InitialPositioning));
-        duo.run(3000);
-        assert_eq!(duo.axes[0].state(), S::Done);
+        let mut pair = alone();
+        pair.axes[0].error = FAR;
+        pair.run_to(S::Fault);
+        assert_eq!(pair.faults()[0], Some(Fault::SettlingTimeout));
+        pair.run(1500);
+        assert_eq!(pair.axes[0].stop_state(), E::WaitingForRelease);
+        pair.axes[0].error = ControlError::None;
+        pair.console.release = true;
+        pair.step();
+        pair.run(2);
+        assert_eq!(pair.axes[0].stop_state(), E::Recovering, "and the withdrawal is sent");
+        pair.run(210);
+        assert_eq!((pair.axes[0].stop_state(), pair.axes[0].state()), (E::Ready, S::InitialPositioning));
+        pair.run(3000);
+        assert_eq!(pair.axes[0].state(), S::Done);
     }
 
     #[test]
     fn the_same_fault_trips_again_when_it_comes_again_while_the_rig_recovers() {
-        let mut duo = alone();
-        duo.axes[0].error = FAR;
-        duo.run_to(S::Fault);
-        duo.run(1500);
-        duo.console.release = true;
-        duo.run(5);
-        assert_eq!(duo.axes[0].stop_state(), E::Recovering);
-        duo.axes[0].fault = Some(Fault::SensorLoss);
-        duo.step();
-        assert_eq!(duo.axes[0].stop_state(), E::Tripped);
-        assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::SensorLoss));
+        let mut pair = alone();
+        pair.axes[0].error = FAR;
+        pair.run_to(S::Fault);
+        pair.run(1500);
+        pair.console.release = true;
+        pair.run(5);
+        assert_eq!(pair.axes[0].stop_state(), E::Recovering);
+        pair.axes[0].fault = Some(Fault::SensorLoss);
+        pair.step();
+        assert_eq!(pair.axes[0].stop_state(), E::Tripped);
+        assert_eq!(pair.axes[0].supervisory.stop.holds(), Some(Fault::SensorLoss));
     }
 }

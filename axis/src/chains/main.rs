@@ -44,9 +44,9 @@ mod tests;
 pub use config::{Lengths, MainConfig, Start, approach_s};
 pub use interface::{AxisMeasurement, MainCause, MainInputs, MainOutput, Phase};
 
-use super::settled::Settled;
+use super::settled::SettlingDetector;
 use super::sync::repetitions_ahead;
-use super::{Entered, Fault, PARTNER_LOST_CYCLES, elapsed_s};
+use super::{Fault, PARTNER_LOST_CYCLES, StateEntry, elapsed_s};
 use protocol::frames::{EmergencyStopChainState, MainChainState};
 
 /// Speed of the initial positioning on average, m/s.
@@ -64,10 +64,10 @@ struct Wait {
     ok_since: Option<u64>,
 }
 
-/// What must be known to go on after an end.
+/// Facts about an abort or a fault that decide how the chain may restart.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Ended {
-    /// The emergency stop chain was seen at work.
+struct RestartConditions {
+    /// The emergency stop chain has left its state ready since.
     stopped: bool,
     /// A person ended the run, so only a person starts it anew.
     by_person: bool,
@@ -80,8 +80,8 @@ enum State {
     WaitingForRig { since: Option<u64> },
     Running { wait: Wait },
     Done,
-    Aborted { ended: Ended },
-    Fault { ended: Ended, fault: Fault },
+    Aborted { restart: RestartConditions },
+    Fault { restart: RestartConditions, fault: Fault },
 }
 
 type Edge = (MainChainState, MainCause);
@@ -89,7 +89,7 @@ type Edge = (MainChainState, MainCause);
 #[derive(Clone, Debug)]
 pub struct MainChain {
     config: MainConfig,
-    settled: Settled,
+    settling: SettlingDetector,
     state: State,
     /// Where the initial positioning began, m, and how long it takes, s.
     from_m: f64,
@@ -97,15 +97,15 @@ pub struct MainChain {
     repetition: u32,
     /// The console's start was heard, here or by the partner.
     started: bool,
-    pub(crate) entered: Entered<MainChainState, MainCause>,
+    pub(crate) entered: StateEntry<MainChainState, MainCause>,
 }
 
 impl MainChain {
     pub fn new(config: MainConfig) -> Self {
-        let entered = Entered { cycle: 0, state: MainChainState::WaitingForRig, cause: MainCause::Began };
-        let settled = Settled::new(config.settled);
+        let entered = StateEntry { cycle: 0, state: MainChainState::WaitingForRig, cause: MainCause::Began };
+        let settling = SettlingDetector::new(config.settled);
         let state = State::WaitingForRig { since: None };
-        Self { config, settled, state, from_m: 0.0, approach_s: 0.0, repetition: 0, started: false, entered }
+        Self { config, settling, state, from_m: 0.0, approach_s: 0.0, repetition: 0, started: false, entered }
     }
 
     /// Moves on by one edge at most, and says what is asked.
@@ -119,20 +119,20 @@ impl MainChain {
 
     /// The rig's time begins anew at `cycle`: so does the chain.
     pub fn restart(&mut self, cycle: u64) {
-        self.settled.clear();
+        self.settling.clear();
         let inputs = MainInputs { cycle, ..MainInputs::default() };
         self.enter(MainChainState::WaitingForRig, MainCause::RigRestarted, &inputs);
     }
 
     pub fn still(&self) -> bool {
-        self.settled.still
+        self.settling.still
     }
 
-    /// Keeps what the inputs tell, without a change of state.
+    /// Stores what later cycles need of the inputs, without a change of state.
     fn note(&mut self, inputs: &MainInputs) {
         let cycle = inputs.cycle;
         if let Some(measurement) = inputs.measurement {
-            self.settled.take(cycle, measurement.position_m, measurement.error);
+            self.settling.take(cycle, measurement.position_m, measurement.error);
         }
         let partner_started = self.config.partner_needed && self.relation(inputs).ok();
         let in_settling = self.entered.state == MainChainState::Settling;
@@ -140,9 +140,9 @@ impl MainChain {
         let (held, ok) = (self.held(inputs), self.ok(inputs));
         match &mut self.state {
             State::WaitingForRig { since } if inputs.measurement.is_some() => *since = since.or(Some(cycle)),
-            State::Aborted { ended } | State::Fault { ended, .. } => {
-                ended.stopped |= inputs.emergency_stop != EmergencyStopChainState::Ready;
-                ended.by_person |= inputs.console.abort;
+            State::Aborted { restart } | State::Fault { restart, .. } => {
+                restart.stopped |= inputs.emergency_stop != EmergencyStopChainState::Ready;
+                restart.by_person |= inputs.console.abort;
             }
             State::Running { wait } => {
                 wait.for_console = if held && !ok { Some(cycle) } else { wait.for_console };
@@ -156,7 +156,7 @@ impl MainChain {
     fn enter(&mut self, state: MainChainState, cause: MainCause, inputs: &MainInputs) {
         use MainChainState as S;
         let stopped = inputs.emergency_stop != EmergencyStopChainState::Ready;
-        let ended = Ended { stopped, by_person: inputs.console.abort };
+        let restart = RestartConditions { stopped, by_person: inputs.console.abort };
         match state {
             S::WaitingForRig => (self.repetition, self.started) = (0, false),
             S::InitialPositioning => self.begin_approach(cause, inputs),
@@ -166,12 +166,12 @@ impl MainChain {
         self.state = match (state, cause) {
             (S::WaitingForRig, _) => State::WaitingForRig { since: None },
             (S::Done, _) => State::Done,
-            (S::Aborted, _) => State::Aborted { ended },
-            (S::Fault, MainCause::Fault(fault)) => State::Fault { ended, fault },
+            (S::Aborted, _) => State::Aborted { restart },
+            (S::Fault, MainCause::Fault(fault)) => State::Fault { restart, fault },
             (S::Fault, _) => unreachable!("only a fault leads to fault"),
             _ => State::Running { wait: Wait::default() },
         };
-        self.entered = Entered { cycle: inputs.cycle, state, cause };
+        self.entered = StateEntry { cycle: inputs.cycle, state, cause };
     }
 
     fn begin_approach(&mut self, cause: MainCause, inputs: &MainInputs) {

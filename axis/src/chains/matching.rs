@@ -17,7 +17,7 @@
 //! remain, besides the drive sensor's own error: the offset makes both axes agree, not either of them true.
 //! A matched offset holds until the next one, or until the rig restarts.
 
-use super::{Entered, Fault, Partner, cycles};
+use super::{Fault, Partner, StateEntry, cycles};
 use protocol::frames::MatchingChainState;
 use settings::parameters::declare;
 
@@ -39,7 +39,7 @@ const SAMPLE_CYCLES: u64 = 10;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct MatchingInputs {
     pub cycle: u64,
-    pub asked: bool,
+    pub requested: bool,
     pub linked: bool,
     pub still: bool,
     /// Position sensor of this axis, without any offset, m.
@@ -60,8 +60,8 @@ pub struct MatchingOutput {
 pub enum MatchingCause {
     /// The controller or the rig began.
     Began,
-    Asked,
-    NotAsked,
+    Requested,
+    NotRequested,
     AtRest,
     NotLinked,
     Silent,
@@ -113,15 +113,15 @@ enum State {
 #[derive(Clone, Debug)]
 pub struct MatchingChain {
     state: State,
-    asked: bool,
+    requested: bool,
     offset_m: f64,
-    pub(crate) entered: Entered<MatchingChainState, MatchingCause>,
+    pub(crate) entered: StateEntry<MatchingChainState, MatchingCause>,
 }
 
 impl Default for MatchingChain {
     fn default() -> Self {
-        let entered = Entered { cycle: 0, state: MatchingChainState::Idle, cause: MatchingCause::Began };
-        Self { state: State::Idle, asked: false, offset_m: 0.0, entered }
+        let entered = StateEntry { cycle: 0, state: MatchingChainState::Idle, cause: MatchingCause::Began };
+        Self { state: State::Idle, requested: false, offset_m: 0.0, entered }
     }
 }
 
@@ -136,7 +136,7 @@ impl MatchingChain {
         if let Some((state, cause)) = self.decide(inputs, &numbers) {
             self.enter(state, cause, inputs.cycle);
         }
-        self.asked = inputs.asked;
+        self.requested = inputs.requested;
         self.output()
     }
 
@@ -183,10 +183,10 @@ impl MatchingChain {
             late.then_some((S::Fault, MatchingCause::Fault(Fault::MatchingTimeout)))
         };
         match &self.state {
-            State::Matched | State::Idle if !inputs.asked => None,
-            _ if !inputs.asked => Some((S::Idle, MatchingCause::NotAsked)),
-            State::Idle => Some((S::WaitingForRest, MatchingCause::Asked)),
-            State::Matched => (!self.asked).then_some((S::WaitingForRest, MatchingCause::Asked)),
+            State::Matched | State::Idle if !inputs.requested => None,
+            _ if !inputs.requested => Some((S::Idle, MatchingCause::NotRequested)),
+            State::Idle => Some((S::WaitingForRest, MatchingCause::Requested)),
+            State::Matched => (!self.requested).then_some((S::WaitingForRest, MatchingCause::Requested)),
             State::Fault { .. } => None,
             State::WaitingForRest { began, rest_since, .. } => {
                 let at_rest = inputs.still && passed(*rest_since) >= cycles(numbers.rest_s);
@@ -242,7 +242,7 @@ impl MatchingChain {
             (S::Fault, MatchingCause::Fault(fault)) => State::Fault { fault },
             (S::Fault, _) => unreachable!("only a fault leads to fault"),
         };
-        self.entered = Entered { cycle: now, state, cause };
+        self.entered = StateEntry { cycle: now, state, cause };
     }
 
     /// When matching was asked for; `now` when it was not.

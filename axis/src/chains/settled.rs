@@ -49,34 +49,35 @@ struct Bucket {
     samples: f64,
 }
 
+/// Detects from samples of position and control error whether an axis is settled.
 #[derive(Clone, Debug)]
-pub struct Settled {
+pub struct SettlingDetector {
     bounds: Bounds,
     buckets: [Option<Bucket>; BUCKETS],
     /// First and last sample of the window without a gap.
-    seen: Option<(u64, u64)>,
-    /// Since when the axis is still and at its set-point.
+    sampled_cycles: Option<(u64, u64)>,
+    /// First cycle in which the axis was still and at its set-point without a break.
     since: Option<u64>,
     /// The position keeps still, whatever the set-point.
     pub(super) still: bool,
 }
 
-impl Settled {
+impl SettlingDetector {
     pub fn new(bounds: Bounds) -> Self {
-        Self { bounds, buckets: [None; BUCKETS], seen: None, since: None, still: false }
+        Self { bounds, buckets: [None; BUCKETS], sampled_cycles: None, since: None, still: false }
     }
 
     /// Takes the sample of `cycle`: position sensor less its offset, unfiltered, and control error.
     pub fn take(&mut self, cycle: u64, position_m: f64, error: ControlError) {
-        let gap = self.seen.is_some_and(|(_, last)| cycle < last || cycle - last > BUCKET_CYCLES);
+        let gap = self.sampled_cycles.is_some_and(|(_, last)| cycle < last || cycle - last > BUCKET_CYCLES);
         if gap {
             self.clear();
         }
-        let first = self.seen.map_or(cycle, |(first, _)| first);
-        self.seen = Some((first, cycle));
-        self.note(cycle, position_m, error);
-        self.still = self.covered(cycle) && self.range_m(cycle) < self.bounds.still_m;
-        let settled = self.still && self.there(cycle, error);
+        let first = self.sampled_cycles.map_or(cycle, |(first, _)| first);
+        self.sampled_cycles = Some((first, cycle));
+        self.add_sample(cycle, position_m, error);
+        self.still = self.window_is_full(cycle) && self.range_m(cycle) < self.bounds.still_m;
+        let settled = self.still && self.is_at_set_point(cycle, error);
         self.since = if settled { self.since.or(Some(cycle)) } else { None };
     }
 
@@ -89,7 +90,7 @@ impl Settled {
         self.since.is_some_and(|since| cycles(elapsed_s(since.max(from), cycle)) >= cycles(settling_s))
     }
 
-    fn note(&mut self, cycle: u64, position_m: f64, error: ControlError) {
+    fn add_sample(&mut self, cycle: u64, position_m: f64, error: ControlError) {
         let value = match error {
             ControlError::None => 0.0,
             ControlError::Position { error_m } => error_m,
@@ -116,8 +117,8 @@ impl Settled {
     }
 
     /// The newest bucket is being filled, so the window lacks up to one bucket of its length.
-    fn covered(&self, cycle: u64) -> bool {
-        self.seen.is_some_and(|(first, _)| cycle - first >= WINDOW_CYCLES - BUCKET_CYCLES)
+    fn window_is_full(&self, cycle: u64) -> bool {
+        self.sampled_cycles.is_some_and(|(first, _)| cycle - first >= WINDOW_CYCLES - BUCKET_CYCLES)
     }
 
     fn range_m(&self, cycle: u64) -> f64 {
@@ -128,7 +129,7 @@ impl Settled {
         high - low
     }
 
-    fn there(&self, cycle: u64, error: ControlError) -> bool {
+    fn is_at_set_point(&self, cycle: u64, error: ControlError) -> bool {
         match error {
             ControlError::None => true,
             ControlError::Position { .. } => {
@@ -165,10 +166,10 @@ mod tests {
 
     /// First cycle at which the axis has been settled for 0.5 s.
     fn first(position_m: impl Fn(u64) -> f64, error: impl Fn(u64) -> ControlError) -> Option<u64> {
-        let mut settled = Settled::new(Bounds::default());
+        let mut settling = SettlingDetector::new(Bounds::default());
         (0..3000).find(|&cycle| {
-            settled.take(cycle, position_m(cycle), error(cycle));
-            settled.settled_for(0.5, 0, cycle)
+            settling.take(cycle, position_m(cycle), error(cycle));
+            settling.settled_for(0.5, 0, cycle)
         })
     }
 
@@ -212,29 +213,29 @@ mod tests {
 
     #[test]
     fn the_settling_time_counts_from_the_state_at_the_earliest() {
-        let mut settled = Settled::new(Bounds::default());
-        (0..2000).for_each(|cycle| settled.take(cycle, 0.1, ControlError::None));
-        assert!(!settled.settled_for(0.5, 1600, 1999));
-        assert!(settled.settled_for(0.5, 1499, 1999));
-        assert!(settled.settled_for(0.0, 1999, 1999));
+        let mut settling = SettlingDetector::new(Bounds::default());
+        (0..2000).for_each(|cycle| settling.take(cycle, 0.1, ControlError::None));
+        assert!(!settling.settled_for(0.5, 1600, 1999));
+        assert!(settling.settled_for(0.5, 1499, 1999));
+        assert!(settling.settled_for(0.0, 1999, 1999));
     }
 
     #[test]
     fn skipped_cycles_are_no_gap_until_a_command_is_stale() {
         for (skipped, still) in [(20, true), (21, false)] {
-            let mut settled = Settled::new(Bounds::default());
-            (0..500).for_each(|cycle| settled.take(cycle, 0.1, ControlError::None));
-            settled.take(499 + skipped, 0.1, ControlError::None);
-            assert_eq!(settled.still, still);
+            let mut settling = SettlingDetector::new(Bounds::default());
+            (0..500).for_each(|cycle| settling.take(cycle, 0.1, ControlError::None));
+            settling.take(499 + skipped, 0.1, ControlError::None);
+            assert_eq!(settling.still, still);
         }
     }
 
     #[test]
     fn a_rig_that_begins_anew_is_a_gap() {
-        let mut settled = Settled::new(Bounds::default());
-        (0..500).for_each(|cycle| settled.take(cycle, 0.1, ControlError::None));
-        settled.take(0, 0.1, ControlError::None);
-        assert!(!settled.still);
+        let mut settling = SettlingDetector::new(Bounds::default());
+        (0..500).for_each(|cycle| settling.take(cycle, 0.1, ControlError::None));
+        settling.take(0, 0.1, ControlError::None);
+        assert!(!settling.still);
     }
 
     #[test]

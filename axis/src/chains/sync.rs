@@ -26,7 +26,7 @@ pub(super) enum Relation {
     Restarted,
     Behind,
     /// In the same state, and whether it is ready to leave.
-    Here {
+    SameState {
         ok: bool,
     },
     Ahead,
@@ -35,7 +35,7 @@ pub(super) enum Relation {
 impl Relation {
     /// Whether the partner lets a chain leave its state.
     pub(super) fn ok(self) -> bool {
-        matches!(self, Self::Here { ok: true } | Self::Ahead)
+        matches!(self, Self::SameState { ok: true } | Self::Ahead)
     }
 }
 
@@ -56,7 +56,7 @@ pub(super) fn relation(state: MainChainState, repetition: u32, partner: &Partner
     match ahead {
         ..-1 => Relation::Restarted,
         -1 => Relation::Behind,
-        0 => Relation::Here { ok: status.ok },
+        0 => Relation::SameState { ok: status.ok },
         1.. => Relation::Ahead,
     }
 }
@@ -82,8 +82,8 @@ mod tests {
     fn the_order_goes_through_states_and_repetitions() {
         let chain = (S::Experiment, 3);
         for (partner, expected) in [
-            ((S::Experiment, 3, false), Relation::Here { ok: false }),
-            ((S::Experiment, 3, true), Relation::Here { ok: true }),
+            ((S::Experiment, 3, false), Relation::SameState { ok: false }),
+            ((S::Experiment, 3, true), Relation::SameState { ok: true }),
             ((S::FinalSettling, 3, false), Relation::Ahead),
             ((S::Done, 3, true), Relation::Ahead),
             ((S::InitialPositioning, 4, false), Relation::Ahead),
@@ -116,16 +116,16 @@ mod tests {
     fn the_repetition_wraps() {
         assert_eq!(seen((S::InitialPositioning, 256), (S::FinalSettling, 255, true)), Relation::Behind);
         assert_eq!(seen((S::FinalSettling, 255), (S::InitialPositioning, 0, true)), Relation::Ahead);
-        assert_eq!(seen((S::Experiment, 511), (S::Experiment, 255, true)), Relation::Here { ok: true });
-        assert_eq!(seen((S::Experiment, 300), (S::Experiment, 44, true)), Relation::Here { ok: true });
+        assert_eq!(seen((S::Experiment, 511), (S::Experiment, 255, true)), Relation::SameState { ok: true });
+        assert_eq!(seen((S::Experiment, 300), (S::Experiment, 44, true)), Relation::SameState { ok: true });
     }
 
     #[test]
     fn only_an_ok_here_or_a_later_state_lets_go() {
-        use Relation::{Aborted, Ahead, Behind, Fault, Here, Restarted, Silent};
-        for hold in [Silent, Aborted, Fault, Restarted, Behind, Here { ok: false }] {
+        use Relation::{Aborted, Ahead, Behind, Fault, Restarted, SameState, Silent};
+        for hold in [Silent, Aborted, Fault, Restarted, Behind, SameState { ok: false }] {
             assert!(!hold.ok(), "{hold:?}");
         }
-        assert!(Ahead.ok() && Here { ok: true }.ok());
+        assert!(Ahead.ok() && SameState { ok: true }.ok());
     }
 }

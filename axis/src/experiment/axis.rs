@@ -33,14 +33,14 @@ pub struct AxisExperiment {
     pub program: ProgramReference,
     /// Where initial positioning goes, m; `None`: it stays where it is.
     pub start_m: Option<f64>,
-    /// What is done after initial positioning, in this order.
+    /// Steps of the preparation after initial positioning, in this order.
     pub prepare: Vec<Prepare>,
     pub initial_ramp_s: f64,
     /// A hand leads the axis during the experiment, under force control with set-point zero, instead of its set-points.
     pub manual: bool,
     pub set_points: SetPoints,
-    /// What set-points given by hand keep to; `None`: none are followed.
-    pub by_hand: Option<ByHandLimits>,
+    /// Limits of set-points given by hand; `None`: none are followed.
+    pub by_hand: Option<OperatorLimits>,
     /// Parameters changed while running, in the order of their times.
     pub changes: Vec<Change>,
 }
@@ -60,9 +60,9 @@ pub enum Prepare {
     Match,
 }
 
-/// What set-points given by hand keep to, in m or N.
+/// Limits of set-points given by hand, in m or N.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ByHandLimits {
+pub struct OperatorLimits {
     /// Largest rate on the way to one, per s.
     pub rate_per_s: f64,
     /// Least and largest one; others are taken to these.
@@ -152,7 +152,7 @@ impl AxisExperiment {
                 }
                 let start_m = section.needed_number(&start)?;
                 let speed = section.number(&BY_HAND_SPEED)?;
-                by_hand = speed.map(|rate_per_s| ByHandLimits { rate_per_s, range: [0.0, stroke_m] });
+                by_hand = speed.map(|rate_per_s| OperatorLimits { rate_per_s, range: [0.0, stroke_m] });
                 SetPoints::Positions(reading::motion(start_m, segments, stroke_m)?)
             }
             Quantity::Force => {
@@ -166,7 +166,7 @@ impl AxisExperiment {
                 let initial_n = section.number_or_default(&initial)?;
                 initial_ramp_s = section.number_or_default(&RAMP)?;
                 let rate = section.number(&BY_HAND_RATE)?;
-                by_hand = rate.map(|rate_per_s| ByHandLimits { rate_per_s, range: [0.0, limit_n] });
+                by_hand = rate.map(|rate_per_s| OperatorLimits { rate_per_s, range: [0.0, limit_n] });
                 SetPoints::Forces(reading::forces([initial_n, limit_n], segments, stroke_m)?)
             }
         };

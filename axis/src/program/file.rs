@@ -20,7 +20,7 @@
 //! What is left out takes the default of its table. In place of a name, `library = "FILE"`, from the program's folder, takes the
 //! algorithm of a shared library (controller/docs/own-algorithm.md).
 
-use super::{EVERY_CYCLES, GivingWay, Program, Slot, Variable};
+use super::{AlgorithmSlot, EVERY_CYCLES, ForceChainSlot, Program, Variable};
 use crate::chains::{force, matching, settled};
 use crate::post_controller::{self, Output, PostController};
 use crate::pre_controller::{self, Geometry, PreController};
@@ -68,27 +68,27 @@ impl Source {
         Ok(Self { path: path.into(), title: title.text, text })
     }
 
-    /// The program of an axis of which nothing is asked.
+    /// The program of an axis without a request.
     pub fn shut() -> Self {
         let text = "title = \"valve held shut\"\n[algorithm]\nname = \"position-p\"\n";
         Self { path: "(none)".into(), title: "valve held shut".into(), text: text.into() }
     }
 
-    /// What the file says besides numbers, by its full key: what a program is made of, and cannot change while it runs.
-    pub fn makings(&self) -> Result<FixedSettings, SettingsError> {
+    /// Settings of the file other than numbers, by full key: they are fixed while the program runs.
+    pub fn fixed_settings(&self) -> Result<FixedSettings, SettingsError> {
         let source = settings::Source::parse(&self.text, &self.path)?;
         let mut root = root(&source)?;
-        let mut makings =
+        let mut fixed_settings =
             FixedSettings::from([(LINEARISATION.to_owned(), Law::ChokedExhaust.name().to_owned())]);
         for name in ["algorithm", "giving-way", "post-controller"] {
             let section = root.section_or_empty(name)?;
             for key in section.keys() {
                 if let Some(text) = section.peek(&key) {
-                    makings.insert(format!("{name}.{key}"), text.to_owned());
+                    fixed_settings.insert(format!("{name}.{key}"), text.to_owned());
                 }
             }
         }
-        Ok(makings)
+        Ok(fixed_settings)
     }
 
     /// The program of `axis` that the file describes, for a rig of these nominal numbers. The time that an algorithm takes is
@@ -109,7 +109,8 @@ impl Source {
         let mut section = root.section_or_empty("post-controller")?;
         let law = section.choice("linearisation", &Law::ALL.map(|law| (law.name(), law)))?;
         let post = reader.section(section, post_controller::Parameters::TABLE)?;
-        let giving_way = root.section("giving-way")?.map(|section| reader.giving_way(section)).transpose()?;
+        let force_chain_slot =
+            root.section("giving-way")?.map(|section| reader.force_chain_slot(section)).transpose()?;
         let force_chain = reader.section(root.section_or_empty(force::TABLE)?, force::Parameters::TABLE)?;
         let matching_chain =
             reader.section(root.section_or_empty(matching::TABLE)?, matching::Parameters::TABLE)?;
@@ -118,14 +119,14 @@ impl Source {
         Ok(Program {
             pre: PreController::new(Geometry::new(axis, rig.cylinder().stroke_m)),
             post: PostController::new(Linearisation::new(rig, law)),
-            user,
-            giving_way,
+            user_slot: user,
+            force_chain_slot,
             variables,
             values,
             tasks: [pre, post, force_chain, matching_chain, settled],
-            ready: algorithms::algorithm::Ready::default(),
-            observed: None,
-            post_stepped: None,
+            input: algorithms::algorithm::AlgorithmInput::default(),
+            observed_cycle: None,
+            post_stepped_cycle: None,
             output: Output::default(),
         })
     }
@@ -163,12 +164,12 @@ impl Reader<'_> {
         Ok(first..self.values.len())
     }
 
-    fn slot(&mut self, mut section: Section<'_>) -> Result<Slot, SettingsError> {
-        let (asked, library) = (section.text("name")?, section.text("library")?);
-        let (algorithm, controls, parameters): (Box<dyn Algorithm>, _, _) = match (asked, library) {
-            (Some(asked), None) => {
-                let kind = algorithms::by_name(&asked.text).ok_or_else(|| {
-                    let problem = format!("name = \"{}\"; allowed is {}", asked.text, names());
+    fn slot(&mut self, mut section: Section<'_>) -> Result<AlgorithmSlot, SettingsError> {
+        let (name, library) = (section.text("name")?, section.text("library")?);
+        let (algorithm, controls, parameters): (Box<dyn Algorithm>, _, _) = match (name, library) {
+            (Some(name), None) => {
+                let kind = algorithms::by_name(&name.text).ok_or_else(|| {
+                    let problem = format!("name = \"{}\"; allowed is {}", name.text, names());
                     section.wrong_at("name", &problem)
                 })?;
                 ((kind.make)(self.rig), kind.controls, kind.parameters.to_vec())
@@ -189,10 +190,10 @@ impl Reader<'_> {
         let values = self.section(section, &table)?;
         let clock = self.real_time.then(|| Box::new(MonotonicClock) as _);
         let algorithm = Guarded::new(algorithm, clock);
-        Ok(Slot { algorithm, controls, values, stepped: None, wanted_m_per_s: 0.0 })
+        Ok(AlgorithmSlot { algorithm, controls, values, stepped_cycle: None, wanted_m_per_s: 0.0 })
     }
 
-    fn giving_way(&mut self, section: Section<'_>) -> Result<GivingWay, SettingsError> {
+    fn force_chain_slot(&mut self, section: Section<'_>) -> Result<ForceChainSlot, SettingsError> {
         let unfit = section.wrong(
             "name: an algorithm of force with the parameters moving and limit_m_per_s is needed, such as force-manual",
         );
@@ -201,13 +202,13 @@ impl Reader<'_> {
             let name = format!("giving-way.{name}");
             self.variables[slot.values.clone()].iter().position(|variable| variable.name == name)
         };
-        let (Quantity::Force, Some(moving), Some(limit_m_per_s)) =
+        let (Quantity::Force, Some(moving_index), Some(limit_index)) =
             (slot.controls, find("moving"), find("limit_m_per_s"))
         else {
             return Err(unfit);
         };
         let effective = self.values[slot.values.clone()].to_vec();
-        Ok(GivingWay { slot, moving, limit_m_per_s, decided: (false, None), effective })
+        Ok(ForceChainSlot { slot, moving_index, limit_index, chain_output: (false, None), effective })
     }
 }
 
@@ -218,7 +219,7 @@ fn names() -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::program::{Demand, Hand};
+    use crate::program::{ActiveAlgorithm, Demand};
     use crate::set_point::{ForceSetPoint, SetPoint};
     use protocol::frames::Sensors;
 
@@ -289,8 +290,8 @@ opening_limit = 0.5
     fn wanted(program: &mut Program, cycle: u64, position_m: f64) -> f64 {
         program.observe(cycle, &Sensors { position_m, ..Sensors::default() }, 7e5);
         let demand = Demand { position: SetPoint::at_rest(0.2), force: ForceSetPoint::at_rest(0.0) };
-        let _ = program.control(cycle, &demand, Hand::User).unwrap();
-        program.wanted_m_per_s(Hand::User)
+        let _ = program.control(cycle, &demand, ActiveAlgorithm::User).unwrap();
+        program.wanted_m_per_s(ActiveAlgorithm::User)
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Claims on a program that runs: who decides what of giving way, and what a stall does.
 
 use super::file::Source;
-use super::{Demand, Hand, Program};
+use super::{ActiveAlgorithm, Demand, Program};
 use crate::chains::force::ForceOutput;
 use crate::set_point::{ForceSetPoint, SetPoint};
 use nominal::{Axis, RigParameters};
@@ -32,7 +32,7 @@ fn demand() -> Demand {
 
 /// What the program wants at a force of -100 N, 5 m/s by the gain alone, after the chain has decided so.
 fn giving_way(program: &mut Program, cycle: u64, limit_m_per_s: Option<f64>) -> f64 {
-    program.give_way(&ForceOutput {
+    program.set_chain_output(&ForceOutput {
         state: ForceChainState::Standstill,
         limit_m_per_s,
         feed_forward: false,
@@ -42,8 +42,8 @@ fn giving_way(program: &mut Program, cycle: u64, limit_m_per_s: Option<f64>) -> 
         fault: None,
     });
     program.observe(cycle, &Sensors { force_n: -100.0, ..Sensors::default() }, 7e5);
-    let _ = program.control(cycle, &demand(), Hand::ForceChain).unwrap();
-    program.wanted_m_per_s(Hand::ForceChain)
+    let _ = program.control(cycle, &demand(), ActiveAlgorithm::ForceChain).unwrap();
+    program.wanted_m_per_s(ActiveAlgorithm::ForceChain)
 }
 
 #[test]
@@ -87,8 +87,8 @@ rest_zone_m = 0.0
 fn at(program: &mut Program, cycle: u64, position_m: f64) -> (f64, f64) {
     let sensors = Sensors { position_m, force_n: 50.0, ..Sensors::default() };
     program.observe(cycle, &sensors, 7e5);
-    let _ = program.control(cycle, &demand(), Hand::User).unwrap();
-    (program.ready.velocity_m_per_s, program.wanted_m_per_s(Hand::User))
+    let _ = program.control(cycle, &demand(), ActiveAlgorithm::User).unwrap();
+    (program.input.velocity_m_per_s, program.wanted_m_per_s(ActiveAlgorithm::User))
 }
 
 #[test]

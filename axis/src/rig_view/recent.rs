@@ -5,44 +5,44 @@ use protocol::frames::{ALIVE_RANGE, Sensors};
 /// Sensors at most so many cycles older than the newest of their axis may be late ones; beyond, they are new, after a long gap.
 const LATEST: u64 = 3;
 
-/// What a frame of sensors is to those of its axis that came before.
+/// How a frame of sensors relates to the earlier ones of its axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Coming {
+pub(super) enum SensorArrival {
     Newer,
-    /// It was missing, and comes after newer ones.
+    /// It arrives after newer ones.
     Late,
-    /// Counter and content are those of one that came.
-    Again,
+    /// Counter and content equal those of a received one.
+    Duplicate,
 }
 
 /// The newest sensors of an axis, as far back as their counter tells them apart.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Recent {
+pub(super) struct RecentSensors {
     /// By counter; `None` where they did not come.
     frames: [Option<Sensors>; ALIVE_RANGE as usize],
     newest: Option<u64>,
 }
 
-impl Recent {
+impl RecentSensors {
     /// Takes a frame in.
     ///
     /// A counter that seems to be behind is a late frame only where one is missing. Else so many frames were lost that the
     /// counter came round.
-    pub(super) fn take(&mut self, sensors: &Sensors) -> Coming {
+    pub(super) fn take(&mut self, sensors: &Sensors) -> SensorArrival {
         let alive = u64::from(sensors.alive) % ALIVE_RANGE;
         let Some(newest) = self.newest else {
             self.newest = Some(alive);
             self.frames[alive as usize] = Some(*sensors);
-            return Coming::Newer;
+            return SensorArrival::Newer;
         };
         let ahead = (ALIVE_RANGE + alive - newest) % ALIVE_RANGE;
         let place = &mut self.frames[alive as usize];
         if ahead == 0 || ahead >= ALIVE_RANGE - LATEST {
             match place {
-                Some(known) if known == sensors => return Coming::Again,
+                Some(known) if known == sensors => return SensorArrival::Duplicate,
                 None => {
                     *place = Some(*sensors);
-                    return Coming::Late;
+                    return SensorArrival::Late;
                 }
                 Some(_) => {}
             }
@@ -53,6 +53,6 @@ impl Recent {
         }
         self.frames[alive as usize] = Some(*sensors);
         self.newest = Some(alive);
-        Coming::Newer
+        SensorArrival::Newer
     }
 }

@@ -139,7 +139,7 @@ fn the_cycle_goes_on_when_the_ticks_counter_wraps() {
     let last = u64::from(u32::MAX);
     view.take_tick(&tick(u32::MAX - 5, 0));
     (last - 4..=last + 5).for_each(|cycle| take_both(&mut view, cycle));
-    assert_eq!(view.take_tick(&tick(4, 0)), TickNews::Usual);
+    assert_eq!(view.take_tick(&tick(4, 0)), TickEvent::Usual);
     assert_eq!((view.fresh_sensors(Axis::Drive).unwrap().0, view.lost.drive), (last + 5, 0));
 }
 
@@ -172,7 +172,7 @@ fn the_ending_tick_settles_the_last_frames() {
     let mut view = RigView::default();
     play(&mut view, 0..98, &[95]);
     let news = view.take_tick(&Tick { ending: true, ..tick(98, 0) });
-    assert_eq!((news, view.lost.drive), (TickNews::Ending, 1));
+    assert_eq!((news, view.lost.drive), (TickEvent::Ending, 1));
 }
 
 #[test]
@@ -180,7 +180,7 @@ fn a_rig_that_starts_anew_is_noticed_and_loses_nothing() {
     let mut view = RigView::default();
     play(&mut view, 0..5001, &[]);
     view.take_sensors(Axis::Drive, sensors(0));
-    assert_eq!(view.take_tick(&tick(0, 0)), TickNews::Restarted);
+    assert_eq!(view.take_tick(&tick(0, 0)), TickEvent::Restarted);
     play(&mut view, 1..101, &[]);
     assert_eq!(view.lost, PerAxis::default());
     assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 100);
@@ -199,7 +199,7 @@ fn sensors_that_pass_others_at_arbitration_are_no_round_of_the_counter() {
         assert_eq!(view.fresh_sensors(Axis::Load).map(|(of, _)| of), Some(cycle));
         assert_eq!(view.fresh_sensors(Axis::Drive).map(|(of, _)| of), Some(cycle + 1));
     }
-    assert_eq!(view.take_tick(&tick(110, 0)), TickNews::Usual);
+    assert_eq!(view.take_tick(&tick(110, 0)), TickEvent::Usual);
 }
 
 /// After a stall the tick is sent first, and arbitration puts the sensors, whose identifiers are lower, ahead of it.

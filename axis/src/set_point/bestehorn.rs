@@ -5,14 +5,14 @@
 //!
 //! Source: VDI 2143 part 1 (inclined sine line); [Neugebauer 2011] calls it Bestehorn sinoid.
 
-use super::law::{BOTH, Kind, Law, Moment, Shaped};
+use super::law::{BOTH, Kind, Law, ProfilePoint, ShapedTransition};
 use std::f64::consts::TAU;
 
 pub const KIND: Kind = Kind {
     name: "bestehorn",
     about: "Bestehorn sinoid to a place",
     serves: BOTH,
-    read: |given| Shaped::read(given, 0.01, at),
+    read: |reader| ShapedTransition::read(reader, 0.01, at),
 };
 
 /// s(z), s'(z) and s''(z) for z in 0 to 1.
@@ -21,30 +21,30 @@ pub(super) fn at(z: f64) -> [f64; 3] {
     [z - sine / TAU, 1.0 - cosine, TAU * sine]
 }
 
-/// A way along the sinoid that fits a state of a chain: it is copied, and needs no memory of its own. In m or N.
+/// A transition along the sinoid that a state of a chain can hold: it is `Copy` and has no memory. In m or N.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SmoothWay {
+pub struct SmoothTransition {
     from: f64,
     to: f64,
     duration_s: f64,
 }
 
-impl SmoothWay {
-    /// From one value to another in `duration_s`; no time at all is a jump.
+impl SmoothTransition {
+    /// From one value to another in `duration_s`; 0 is a jump.
     pub const fn new(from: f64, to: f64, duration_s: f64) -> Self {
         Self { from, to, duration_s }
     }
 
     /// The set-point `time_s` after its start, in the unit of its values.
-    pub fn at(&self, time_s: f64) -> Moment {
+    pub fn at(&self, time_s: f64) -> ProfilePoint {
         let Self { from, to, duration_s } = *self;
         if time_s < 0.0 {
-            return Moment::at_rest(from);
+            return ProfilePoint::at_rest(from);
         }
         if time_s >= duration_s {
-            return Moment::at_rest(to);
+            return ProfilePoint::at_rest(to);
         }
-        Shaped { from, to, duration_s, shape: at }.at(time_s)
+        ShapedTransition { from, to, duration_s, shape: at }.at(time_s)
     }
 }
 
@@ -65,10 +65,10 @@ mod tests {
 
     #[test]
     fn a_smooth_way_rests_before_and_behind() {
-        let way = SmoothWay::new(0.1, 0.4, 3.0);
-        assert_eq!(way.at(-1.0), Moment::at_rest(0.1));
-        assert_eq!(way.at(3.0), Moment::at_rest(0.4));
-        assert_eq!(SmoothWay::new(0.0, 100.0, 0.0).at(0.0), Moment::at_rest(100.0));
+        let way = SmoothTransition::new(0.1, 0.4, 3.0);
+        assert_eq!(way.at(-1.0), ProfilePoint::at_rest(0.1));
+        assert_eq!(way.at(3.0), ProfilePoint::at_rest(0.4));
+        assert_eq!(SmoothTransition::new(0.0, 100.0, 0.0).at(0.0), ProfilePoint::at_rest(100.0));
         assert!(way.at(1.0).moving && way.at(1.0).rate > 0.0);
     }
 }

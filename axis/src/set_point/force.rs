@@ -19,8 +19,8 @@ pub mod dry_friction;
 pub mod mass;
 pub mod spring;
 
-use super::law::{Given, Law, Moment};
-use super::row::{Lasting, Place, Row};
+use super::law::{Law, ProfilePoint, SegmentReader};
+use super::row::{Row, RowPosition, RowSegment};
 use super::{Actual, ForceSetPoint};
 use at_position::AtPosition;
 use settings::SettingsError;
@@ -34,11 +34,11 @@ pub const KINDS: &[Kind] = &[spring::KIND, damper::KIND, mass::KIND, dry_frictio
 pub struct Kind {
     pub name: &'static str,
     pub about: &'static str,
-    pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Load>, SettingsError>,
+    pub(crate) read: fn(&mut SegmentReader<'_, '_>) -> Result<Arc<dyn Load>, SettingsError>,
 }
 
 pub trait Load: fmt::Debug + Send + Sync {
-    /// What it adds to its base force, N, and the rate of that, N/s.
+    /// Force added to the base force, N, and its rate, N/s.
     fn at(&self, actual: &Actual) -> [f64; 2];
 }
 
@@ -49,7 +49,7 @@ pub(super) enum Segment {
     Load { load: Arc<dyn Load>, base_n: f64, duration_s: f64 },
 }
 
-impl Lasting for Segment {
+impl RowSegment for Segment {
     fn duration_and_end(&self) -> (f64, f64) {
         match self {
             Self::Timed(law) => law.duration_and_end(),
@@ -60,16 +60,16 @@ impl Lasting for Segment {
 }
 
 impl Segment {
-    pub(super) fn read_load(kind: &Kind, given: &mut Given<'_, '_>) -> Result<Self, SettingsError> {
-        let load = (kind.read)(given)?;
+    pub(super) fn read_load(kind: &Kind, reader: &mut SegmentReader<'_, '_>) -> Result<Self, SettingsError> {
+        let load = (kind.read)(reader)?;
         let base = Parameter::new(
             ("base_force_n", "N"),
-            [0.0, given.scale.force_limit_n],
-            given.from,
+            [0.0, reader.scale.force_limit_n],
+            reader.from,
             "force without the load; by default where the row stands",
         );
-        let base_n = given.section.number_or_default(&base)?;
-        Ok(Self::Load { load, base_n, duration_s: given.duration_s(0.001)? })
+        let base_n = reader.section.number_or_default(&base)?;
+        Ok(Self::Load { load, base_n, duration_s: reader.duration_s(0.001)? })
     }
 }
 
@@ -89,8 +89,8 @@ impl ForceProfile {
         self.row.start
     }
 
-    fn limited(&self, moment: Moment) -> ForceSetPoint {
-        let mut point = ForceSetPoint::from(moment);
+    fn limited(&self, unlimited: ProfilePoint) -> ForceSetPoint {
+        let mut point = ForceSetPoint::from(unlimited);
         if !point.rate_n_per_s.is_finite() {
             point.rate_n_per_s = 0.0;
         }
@@ -129,10 +129,10 @@ impl ForceSource {
 
     /// The set-point `time_s` after the start: the initial force before it, [`Self::end`] from the end on.
     pub fn at(&mut self, time_s: f64, actual: &Actual) -> ForceSetPoint {
-        let moment = match self.profile.row.place(time_s) {
-            Place::Before => Moment::at_rest(self.profile.initial_force_n()),
-            Place::Behind => return self.end(),
-            Place::In { index, segment, since_s } => {
+        let unlimited = match self.profile.row.locate(time_s) {
+            RowPosition::Before => ProfilePoint::at_rest(self.profile.initial_force_n()),
+            RowPosition::After => return self.end(),
+            RowPosition::In { index, segment, since_s } => {
                 if self.memory.segment != Some(index) {
                     self.memory.segment = Some(index);
                     self.memory.crossing = at_position::Crossing::default();
@@ -142,12 +142,12 @@ impl ForceSource {
                     Segment::AtPosition(step) => step.at(since_s, &mut self.memory.crossing, actual),
                     Segment::Load { load, base_n, .. } => {
                         let [force, rate] = load.at(actual);
-                        Moment { value: base_n + force, rate, acceleration: 0.0, moving: true }
+                        ProfilePoint { value: base_n + force, rate, acceleration: 0.0, moving: true }
                     }
                 }
             }
         };
-        let point = self.profile.limited(moment);
+        let point = self.profile.limited(unlimited);
         let last = self.memory.segment.and_then(|index| self.profile.row.segments.get(index));
         self.memory.last_n = matches!(last, Some(Segment::Load { .. })).then_some(point.force_n);
         point

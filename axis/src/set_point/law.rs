@@ -1,7 +1,7 @@
-//! What a law is, the list of those that depend on time alone, and how they are read.
+//! Laws of set-points over time: their interface, the list of those that depend on time alone, and how they are read.
 //!
-//! A law knows where its row stands when it begins, and tells value, rate and acceleration at a time since then. Its unit is the
-//! row's, m or N: the same law moves an axis and leads a force, and only its keys differ (`to_m`, `to_n`).
+//! A law starts from the end value of the segment before it, and gives value, rate and acceleration at a time since its start.
+//! Its unit is the row's, m or N: the same law moves an axis and leads a force, and only its keys differ (`to_m`, `to_n`).
 //! A new law is a file beside this one and a line in [`KINDS`].
 
 use super::{bestehorn, modified_sine, oscillation, pseudo_random_steps, ramp, step, table, trapezoidal};
@@ -30,16 +30,16 @@ pub struct Kind {
     pub name: &'static str,
     pub about: &'static str,
     pub serves: &'static [Quantity],
-    pub(crate) read: fn(&mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError>,
+    pub(crate) read: fn(&mut SegmentReader<'_, '_>) -> Result<Arc<dyn Law>, SettingsError>,
 }
 
 pub(super) const BOTH: &[Quantity] = &[Quantity::Position, Quantity::Force];
 
-/// A value over time, from where the row stands.
+/// A value over time, from the end value of the segment before it.
 pub trait Law: fmt::Debug + Send + Sync {
     /// Value and derivatives `time_s` after the beginning, 0 to the duration.
-    fn at(&self, time_s: f64) -> Moment;
-    /// What it takes and where it goes; asked when it is read, not while it runs.
+    fn at(&self, time_s: f64) -> ProfilePoint;
+    /// Its duration, end value and range; read when the experiment is loaded, not while it runs.
     fn extent(&self) -> Extent;
 }
 
@@ -48,12 +48,12 @@ pub struct Extent {
     pub(super) duration_s: f64,
     /// The value from its end on.
     pub(super) end: f64,
-    /// Least and largest value on the way.
+    /// Least and largest value in between.
     pub(super) reach: [f64; 2],
 }
 
 impl Extent {
-    /// Of a way from one value to another.
+    /// Of a transition from one value to another.
     pub(super) fn between(from: f64, to: f64, duration_s: f64) -> Self {
         Self { duration_s, end: to, reach: [from.min(to), from.max(to)] }
     }
@@ -66,21 +66,21 @@ impl Extent {
 
 /// Value and derivatives at a time, in the unit of the row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Moment {
+pub struct ProfilePoint {
     pub(crate) value: f64,
     pub(crate) rate: f64,
     pub(crate) acceleration: f64,
     pub(crate) moving: bool,
 }
 
-impl Moment {
+impl ProfilePoint {
     pub(crate) const fn at_rest(value: f64) -> Self {
         Self { value, rate: 0.0, acceleration: 0.0, moving: false }
     }
 }
 
-/// A way along a shape s(z) with z = t / T, both 0 to 1.
-pub(super) struct Shaped {
+/// A transition along a normalised shape s(z) with z = t / T, both 0 to 1.
+pub(super) struct ShapedTransition {
     pub(super) from: f64,
     pub(super) to: f64,
     pub(super) duration_s: f64,
@@ -88,27 +88,27 @@ pub(super) struct Shaped {
     pub(super) shape: fn(f64) -> [f64; 3],
 }
 
-impl Shaped {
-    /// Reads the way to a place, which takes `least_s` or longer.
+impl ShapedTransition {
+    /// Reads a transition to an end value, which takes `least_s` or longer.
     pub(super) fn read(
-        given: &mut Given<'_, '_>,
+        reader: &mut SegmentReader<'_, '_>,
         least_s: f64,
         shape: fn(f64) -> [f64; 3],
     ) -> Result<Arc<dyn Law>, SettingsError> {
-        let to = given.place("to", "where it ends")?;
-        Ok(Arc::new(Self { from: given.from, to, duration_s: given.duration_s(least_s)?, shape }))
+        let to = reader.value("to", "where it ends")?;
+        Ok(Arc::new(Self { from: reader.from, to, duration_s: reader.duration_s(least_s)?, shape }))
     }
 }
 
-impl Law for Shaped {
-    fn at(&self, time_s: f64) -> Moment {
+impl Law for ShapedTransition {
+    fn at(&self, time_s: f64) -> ProfilePoint {
         let [s, ds_dz, d2s_dz2] = (self.shape)((time_s / self.duration_s).clamp(0.0, 1.0));
-        let way = self.to - self.from;
-        Moment {
-            value: self.from + way * s,
-            rate: way * ds_dz / self.duration_s,
-            acceleration: way * d2s_dz2 / (self.duration_s * self.duration_s),
-            moving: way != 0.0,
+        let span = self.to - self.from;
+        ProfilePoint {
+            value: self.from + span * s,
+            rate: span * ds_dz / self.duration_s,
+            acceleration: span * d2s_dz2 / (self.duration_s * self.duration_s),
+            moving: span != 0.0,
         }
     }
 
@@ -117,13 +117,13 @@ impl Law for Shaped {
     }
 }
 
-impl fmt::Debug for Shaped {
+impl fmt::Debug for ShapedTransition {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "from {} to {} in {} s", self.from, self.to, self.duration_s)
     }
 }
 
-/// What a row is of and how far it may go.
+/// Quantity of a row and its limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Scale {
     pub(crate) quantity: Quantity,
@@ -150,16 +150,16 @@ impl Scale {
 
 const LONGEST_S: f64 = 86_400.0;
 
-/// The table of one segment, and where its row stands.
-pub(crate) struct Given<'g, 'a> {
+/// The table of one segment, the value at which the segment starts, and the scale of its row.
+pub(crate) struct SegmentReader<'g, 'a> {
     pub(crate) section: &'g mut Section<'a>,
     pub(crate) from: f64,
     pub(crate) scale: Scale,
 }
 
-impl Given<'_, '_> {
+impl SegmentReader<'_, '_> {
     /// A value of the row's own unit that must be given: `to` reads `to_m` or `to_n`.
-    pub(crate) fn place(&mut self, stem: &str, meaning: &'static str) -> Result<f64, SettingsError> {
+    pub(crate) fn value(&mut self, stem: &str, meaning: &'static str) -> Result<f64, SettingsError> {
         let parameter = self.in_unit(stem, self.scale.most(), meaning);
         self.section.needed_number(&parameter)
     }

@@ -13,14 +13,14 @@
 //!
 //! Source: VDI 2143 part 1 (modified sine line).
 
-use super::law::{BOTH, Kind, Shaped};
+use super::law::{BOTH, Kind, ShapedTransition};
 use std::f64::consts::PI;
 
 pub const KIND: Kind = Kind {
     name: "modified-sine",
     about: "modified sine to a place: slower at its fastest than the sinoid",
     serves: BOTH,
-    read: |given| Shaped::read(given, 0.01, at),
+    read: |reader| ShapedTransition::read(reader, 0.01, at),
 };
 
 const K: f64 = PI / (4.0 + PI);

@@ -12,7 +12,7 @@
 //! multiple of pi, so that the row goes on where it stood; with one it begins and ends at rest.
 
 use super::bestehorn;
-use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
+use super::law::{BOTH, Extent, Kind, Law, ProfilePoint, SegmentReader};
 use settings::SettingsError;
 use settings::parameters::Parameter;
 use std::f64::consts::{PI, TAU};
@@ -22,9 +22,9 @@ pub const SINE: Kind = Kind {
     name: "sine",
     about: "to either side at one frequency",
     serves: BOTH,
-    read: |given| {
-        let frequency_hz = given.number(&FREQUENCY)?;
-        Oscillation::read(given, [frequency_hz; 2])
+    read: |reader| {
+        let frequency_hz = reader.number(&FREQUENCY)?;
+        Oscillation::read(reader, [frequency_hz; 2])
     },
 };
 
@@ -32,9 +32,9 @@ pub const CHIRP: Kind = Kind {
     name: "chirp",
     about: "to either side at a frequency that sweeps",
     serves: BOTH,
-    read: |given| {
-        let frequencies_hz = [given.number(&FROM)?, given.number(&TO)?];
-        Oscillation::read(given, frequencies_hz)
+    read: |reader| {
+        let frequencies_hz = [reader.number(&FROM)?, reader.number(&TO)?];
+        Oscillation::read(reader, frequencies_hz)
     },
 };
 
@@ -58,16 +58,16 @@ pub(super) struct Oscillation {
 
 impl Oscillation {
     pub(super) fn read(
-        given: &mut Given<'_, '_>,
+        reader: &mut SegmentReader<'_, '_>,
         [from_hz, to_hz]: [f64; 2],
     ) -> Result<Arc<dyn Law>, SettingsError> {
-        let amplitude = given.amplitude()?;
-        let duration_s = given.duration_s(0.01)?;
-        let fade_s = given.section.number_or_default(&FADE)?;
+        let amplitude = reader.amplitude()?;
+        let duration_s = reader.duration_s(0.01)?;
+        let fade_s = reader.section.number_or_default(&FADE)?;
         if 2.0 * fade_s > duration_s {
             let most_s = 0.5 * duration_s;
             let message = format!("fade_s = {fade_s} s; allowed is 0 to {most_s} s, half of duration_s");
-            return Err(given.section.wrong_at("fade_s", &message));
+            return Err(reader.section.wrong_at("fade_s", &message));
         }
         let halves = (from_hz + to_hz) * duration_s;
         if fade_s == 0.0 && (halves - halves.round()).abs() > PHASE_TOLERANCE {
@@ -77,9 +77,9 @@ impl Oscillation {
                 "duration_s = {duration_s} s ends off the middle; allowed is a multiple of half a period, such as {shorter_s} \
                  or {longer_s} s, or a fade_s above 0"
             );
-            return Err(given.section.wrong_at("duration_s", &message));
+            return Err(reader.section.wrong_at("duration_s", &message));
         }
-        Ok(Arc::new(Self { from: given.from, amplitude, from_hz, to_hz, duration_s, fade_s }))
+        Ok(Arc::new(Self { from: reader.from, amplitude, from_hz, to_hz, duration_s, fade_s }))
     }
 
     /// Fade with its two derivatives.
@@ -96,7 +96,7 @@ impl Oscillation {
 }
 
 impl Law for Oscillation {
-    fn at(&self, time_s: f64) -> Moment {
+    fn at(&self, time_s: f64) -> ProfilePoint {
         let sweep_hz_per_s = (self.to_hz - self.from_hz) / self.duration_s;
         let turns = (self.from_hz + 0.5 * sweep_hz_per_s * time_s) * time_s;
         let phase_rate = TAU * (self.from_hz + sweep_hz_per_s * time_s);
@@ -106,7 +106,7 @@ impl Law for Oscillation {
         let [w, w1, w2] = self.fade(time_s);
         let along = w2 - w * phase_rate * phase_rate;
         let across = 2.0 * w1 * phase_rate + w * TAU * sweep_hz_per_s;
-        Moment {
+        ProfilePoint {
             value: self.from + self.amplitude * w * sine,
             rate: self.amplitude * (w1 * sine + w * phase_rate * cosine),
             acceleration: self.amplitude * (along * sine + across * cosine),

@@ -8,7 +8,7 @@
 //!
 //! Source: O'Neill, PCG, 2014 (generator).
 
-use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
+use super::law::{BOTH, Extent, Kind, Law, ProfilePoint, SegmentReader};
 use super::step::JUMP_S;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
@@ -30,17 +30,17 @@ static LEVELS: Parameter =
 /// Steps that a segment may have; they are drawn when it is read.
 const MOST_STEPS: f64 = 1e6;
 
-fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
-    let amplitude = given.amplitude()?;
-    let hold_s = given.number(&HOLD)?;
-    let duration_s = given.duration_s(0.001)?;
-    let seed = given.section.whole_or_default(&SEED)?;
-    let levels = given.section.whole_or_default(&LEVELS)?;
+fn read(reader: &mut SegmentReader<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
+    let amplitude = reader.amplitude()?;
+    let hold_s = reader.number(&HOLD)?;
+    let duration_s = reader.duration_s(0.001)?;
+    let seed = reader.section.whole_or_default(&SEED)?;
+    let levels = reader.section.whole_or_default(&LEVELS)?;
     if duration_s / hold_s > MOST_STEPS {
         let message = format!("hold_s = {hold_s} s; allowed are at most {MOST_STEPS} steps in duration_s");
-        return Err(given.section.wrong_at("hold_s", &message));
+        return Err(reader.section.wrong_at("hold_s", &message));
     }
-    let around = [given.from, amplitude];
+    let around = [reader.from, amplitude];
     Ok(Arc::new(PseudoRandomSteps::new(around, [hold_s, duration_s], seed.into(), levels)))
 }
 
@@ -68,14 +68,14 @@ impl PseudoRandomSteps {
 }
 
 impl Law for PseudoRandomSteps {
-    fn at(&self, time_s: f64) -> Moment {
+    fn at(&self, time_s: f64) -> ProfilePoint {
         // A nanosecond early, as a row does, so that a step never misses its cycle.
         let index = ((time_s + 1e-9) / self.hold_s).floor().max(0.0);
         let since_s = time_s - index * self.hold_s;
         let index = (index as usize).min(self.values.len() - 1);
         let before = if index == 0 { self.from } else { self.values[index - 1] };
         let value = self.values[index];
-        Moment { moving: since_s < JUMP_S && value != before, ..Moment::at_rest(value) }
+        ProfilePoint { moving: since_s < JUMP_S && value != before, ..ProfilePoint::at_rest(value) }
     }
 
     fn extent(&self) -> Extent {

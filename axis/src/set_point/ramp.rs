@@ -4,11 +4,11 @@
 //!   s(z) = z
 //! ```
 
-use super::law::{BOTH, Kind, Shaped};
+use super::law::{BOTH, Kind, ShapedTransition};
 
 pub const KIND: Kind = Kind {
     name: "ramp",
     about: "at one rate to a place",
     serves: BOTH,
-    read: |given| Shaped::read(given, 0.001, |z| [z, 1.0, 0.0]),
+    read: |reader| ShapedTransition::read(reader, 0.001, |z| [z, 1.0, 0.0]),
 };

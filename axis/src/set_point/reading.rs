@@ -1,22 +1,22 @@
 //! Rows of set-points from the tables of an experiment file.
 
 use super::force::{self, ForceProfile, Segment, at_position::AtPosition};
-use super::law::{self, Given, Law, Scale};
-use super::row::{Lasting, Row};
+use super::law::{self, Law, Scale, SegmentReader};
+use super::row::{Row, RowSegment};
 use super::{Motion, table};
 use algorithms::algorithm::Quantity;
 use settings::{Section, SettingsError};
 use std::sync::Arc;
 
-/// Keys that say what a law is of, where the law alone does not.
-const TELLING: [(&str, Quantity); 4] = [
+/// Keys from which the quantity of a law follows, where its name alone does not say it.
+const QUANTITY_KEYS: [(&str, Quantity); 4] = [
     ("to_m", Quantity::Position),
     ("amplitude_m", Quantity::Position),
     ("to_n", Quantity::Force),
     ("amplitude_n", Quantity::Force),
 ];
 
-/// What the row is of; `None` when none of its segments says.
+/// Quantity of the row; `None` when none of its segments says it.
 pub(crate) fn quantity(segments: &[Section<'_>]) -> Result<Option<Quantity>, SettingsError> {
     let mut first = None;
     for segment in segments {
@@ -44,7 +44,7 @@ fn stated_quantity(segment: &Section<'_>) -> Option<Quantity> {
     if name == table::KIND.name {
         return table::quantity_of(&segment.beside(segment.peek("file")?));
     }
-    TELLING.iter().find(|(key, _)| segment.has(key)).map(|(_, quantity)| *quantity)
+    QUANTITY_KEYS.iter().find(|(key, _)| segment.has(key)).map(|(_, quantity)| *quantity)
 }
 
 /// A row of positions within the stroke.
@@ -64,29 +64,29 @@ pub(crate) fn forces(
     stroke_m: f64,
 ) -> Result<ForceProfile, SettingsError> {
     let scale = Scale { quantity: Quantity::Force, stroke_m, force_limit_n: limit_n };
-    let segment = |name: &str, given: &mut Given<'_, '_>| {
-        let at_position = name == super::step::KIND.name && given.section.has(force::at_position::KEY);
+    let segment = |name: &str, reader: &mut SegmentReader<'_, '_>| {
+        let at_position = name == super::step::KIND.name && reader.section.has(force::at_position::KEY);
         Ok(match force::KINDS.iter().find(|kind| kind.name == name) {
-            Some(kind) => Segment::read_load(kind, given)?,
-            None if at_position => Segment::AtPosition(AtPosition::read(given)?),
-            None => Segment::Timed(timed(name, given)?),
+            Some(kind) => Segment::read_load(kind, reader)?,
+            None if at_position => Segment::AtPosition(AtPosition::read(reader)?),
+            None => Segment::Timed(timed(name, reader)?),
         })
     };
     Ok(ForceProfile { row: row(initial_n, sections, scale, segment)?, limit_n })
 }
 
 /// A row from `start` on, whose segments are read by their names, each from where the one before it ends.
-fn row<S: Lasting>(
+fn row<S: RowSegment>(
     start: f64,
     sections: Vec<Section<'_>>,
     scale: Scale,
-    read: impl Fn(&str, &mut Given<'_, '_>) -> Result<S, SettingsError>,
+    read: impl Fn(&str, &mut SegmentReader<'_, '_>) -> Result<S, SettingsError>,
 ) -> Result<Row<S>, SettingsError> {
     let mut from = start;
     let mut segments = Vec::new();
     for mut section in sections {
         let name = section.needed_text("law", &names(scale.quantity))?.text;
-        let segment = read(&name, &mut Given { section: &mut section, from, scale })?;
+        let segment = read(&name, &mut SegmentReader { section: &mut section, from, scale })?;
         section.finish()?;
         (_, from) = segment.duration_and_end();
         segments.push(segment);
@@ -95,22 +95,22 @@ fn row<S: Lasting>(
 }
 
 /// The law called `name`, within the limits of its row.
-fn timed(name: &str, given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
-    let quantity = given.scale.quantity;
+fn timed(name: &str, reader: &mut SegmentReader<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
+    let quantity = reader.scale.quantity;
     let kind = law::KINDS.iter().find(|kind| kind.name == name && kind.serves.contains(&quantity));
     let Some(kind) = kind else {
         let message = format!("law = \"{name}\"; allowed is {}", names(quantity));
-        return Err(given.section.wrong_at("law", &message));
+        return Err(reader.section.wrong_at("law", &message));
     };
-    let law = (kind.read)(given)?;
-    let ([least, most], unit) = (law.extent().reach, given.scale.unit());
-    if least >= 0.0 && most <= given.scale.most() {
+    let law = (kind.read)(reader)?;
+    let ([least, most], unit) = (law.extent().reach, reader.scale.unit());
+    if least >= 0.0 && most <= reader.scale.most() {
         return Ok(law);
     }
-    let allowed = given.scale.most();
+    let allowed = reader.scale.most();
     let message =
         format!("law = \"{name}\" goes from {least} to {most} {unit}; allowed is 0 to {allowed} {unit}");
-    Err(given.section.wrong_at("law", &message))
+    Err(reader.section.wrong_at("law", &message))
 }
 
 fn names(quantity: Quantity) -> String {

@@ -6,12 +6,13 @@ use std::sync::Arc;
 /// Sums of decimal fractions carry roundings: a segment begins a nanosecond early, so that it never misses its cycle of 1 ms.
 pub(super) const ROUNDING_S: f64 = 1e-9;
 
-pub(super) trait Lasting {
-    /// How long it takes, s, and the value from its end on.
+/// A segment of a row.
+pub(super) trait RowSegment {
+    /// Its duration, s, and the value from its end on.
     fn duration_and_end(&self) -> (f64, f64);
 }
 
-impl Lasting for Arc<dyn Law> {
+impl RowSegment for Arc<dyn Law> {
     fn duration_and_end(&self) -> (f64, f64) {
         let extent = self.extent();
         (extent.duration_s, extent.end)
@@ -29,7 +30,7 @@ pub(super) struct Row<S> {
     pub(super) end: f64,
 }
 
-impl<S: Lasting> Row<S> {
+impl<S: RowSegment> Row<S> {
     pub(super) fn new(start: f64, segments: Vec<S>) -> Self {
         let (mut end_s, mut end) = (0.0, start);
         let mut ends = |segment: &S| {
@@ -42,18 +43,18 @@ impl<S: Lasting> Row<S> {
         Self { start, segments, until_s, end }
     }
 
-    pub(super) fn place(&self, time_s: f64) -> Place<'_, S> {
+    pub(super) fn locate(&self, time_s: f64) -> RowPosition<'_, S> {
         if time_s < -ROUNDING_S {
-            return Place::Before;
+            return RowPosition::Before;
         }
         let mut begun_s = 0.0;
         for (index, (segment, until_s)) in self.segments.iter().zip(&self.until_s).enumerate() {
             if time_s < until_s - ROUNDING_S {
-                return Place::In { index, segment, since_s: (time_s - begun_s).max(0.0) };
+                return RowPosition::In { index, segment, since_s: (time_s - begun_s).max(0.0) };
             }
             begun_s = *until_s;
         }
-        Place::Behind
+        RowPosition::After
     }
 
     pub(super) fn duration_s(&self) -> f64 {
@@ -61,9 +62,10 @@ impl<S: Lasting> Row<S> {
     }
 }
 
+/// Where a time lies in a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Place<'a, S> {
+pub(super) enum RowPosition<'a, S> {
     Before,
     In { index: usize, segment: &'a S, since_s: f64 },
-    Behind,
+    After,
 }

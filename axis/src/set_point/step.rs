@@ -4,7 +4,7 @@
 //! The set-point counts as moving in the basic cycle in which it jumps, so that the rest behind is one of its own; its rate is 0,
 //! since a jump has none.
 
-use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
+use super::law::{BOTH, Extent, Kind, Law, ProfilePoint, SegmentReader};
 use algorithms::algorithm::Quantity;
 use settings::SettingsError;
 use std::sync::Arc;
@@ -16,9 +16,9 @@ pub const KIND: Kind = Kind {
     name: "step",
     about: "at once to a place, which is then held",
     serves: BOTH,
-    read: |given| {
-        let to = given.place("to", "where it jumps to")?;
-        Step::read(given, to, 0.001)
+    read: |reader| {
+        let to = reader.value("to", "where it jumps to")?;
+        Step::read(reader, to, 0.001)
     },
 };
 
@@ -26,16 +26,16 @@ pub const REST: Kind = Kind {
     name: "rest",
     about: "stays where it is",
     serves: BOTH,
-    read: |given| Step::read(given, given.from, 0.0),
+    read: |reader| Step::read(reader, reader.from, 0.0),
 };
 
 pub const CONSTANT: Kind = Kind {
     name: "constant",
     about: "a constant force",
     serves: &[Quantity::Force],
-    read: |given| {
-        let to = given.place("force", "the force that is held")?;
-        Step::read(given, to, 0.001)
+    read: |reader| {
+        let to = reader.value("force", "the force that is held")?;
+        Step::read(reader, to, 0.001)
     },
 };
 
@@ -47,14 +47,18 @@ struct Step {
 }
 
 impl Step {
-    fn read(given: &mut Given<'_, '_>, to: f64, least_s: f64) -> Result<Arc<dyn Law>, SettingsError> {
-        Ok(Arc::new(Self { from: given.from, to, duration_s: given.duration_s(least_s)? }))
+    fn read(
+        reader: &mut SegmentReader<'_, '_>,
+        to: f64,
+        least_s: f64,
+    ) -> Result<Arc<dyn Law>, SettingsError> {
+        Ok(Arc::new(Self { from: reader.from, to, duration_s: reader.duration_s(least_s)? }))
     }
 }
 
 impl Law for Step {
-    fn at(&self, time_s: f64) -> Moment {
-        Moment { moving: time_s < JUMP_S && self.to != self.from, ..Moment::at_rest(self.to) }
+    fn at(&self, time_s: f64) -> ProfilePoint {
+        ProfilePoint { moving: time_s < JUMP_S && self.to != self.from, ..ProfilePoint::at_rest(self.to) }
     }
 
     fn extent(&self) -> Extent {

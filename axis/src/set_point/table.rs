@@ -12,7 +12,7 @@
 //!
 //! Source: Fritsch and Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300 (the mean, here unweighted).
 
-use super::law::{BOTH, Extent, Given, Kind, Law, Moment};
+use super::law::{BOTH, Extent, Kind, Law, ProfilePoint, SegmentReader};
 use algorithms::algorithm::Quantity;
 use runlog::run_folder::read_text;
 use settings::SettingsError;
@@ -29,31 +29,31 @@ const COLUMNS: [(&str, Quantity); 2] = [("position_m", Quantity::Position), ("fo
 const START_TOLERANCE_M: f64 = 1e-5;
 const MOST_POINTS: usize = 1_000_000;
 
-fn read(given: &mut Given<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
-    let file = given.section.needed_text("file", "the CSV file, relative to the experiment's folder")?;
-    let path = given.section.beside(&file.text);
-    let smooth = given.section.choice("interpolation", &[("linear", false), ("smooth", true)])?;
-    let reported = |said: String| given.section.wrong_at("file", &format!("file: {said}"));
+fn read(reader: &mut SegmentReader<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
+    let file = reader.section.needed_text("file", "the CSV file, relative to the experiment's folder")?;
+    let path = reader.section.beside(&file.text);
+    let smooth = reader.section.choice("interpolation", &[("linear", false), ("smooth", true)])?;
+    let reported = |problem: String| reader.section.wrong_at("file", &format!("file: {problem}"));
     let (quantity, points) = points_of(&path).map_err(reported)?;
-    let (unit, most) = (given.scale.unit(), given.scale.most());
-    if quantity != given.scale.quantity {
-        let column = COLUMNS.iter().find(|(_, of)| *of == given.scale.quantity).map_or("", |(name, _)| name);
+    let (unit, most) = (reader.scale.unit(), reader.scale.most());
+    if quantity != reader.scale.quantity {
+        let column = COLUMNS.iter().find(|(_, of)| *of == reader.scale.quantity).map_or("", |(name, _)| name);
         return Err(reported(format!("{}:1: column {column} is missing", path.display())));
     }
     let outside = points.iter().find(|point| !(0.0..=most).contains(&point.value));
     if let Some(Point { line, value, .. }) = outside {
-        let said = format!("{}:{line}: {value} {unit}; allowed is 0 to {most} {unit}", path.display());
-        return Err(reported(said));
+        let problem = format!("{}:{line}: {value} {unit}; allowed is 0 to {most} {unit}", path.display());
+        return Err(reported(problem));
     }
     let Point { line, value, .. } = points[0];
-    if quantity == Quantity::Position && (value - given.from).abs() > START_TOLERANCE_M {
-        let (path, from) = (path.display(), given.from);
+    if quantity == Quantity::Position && (value - reader.from).abs() > START_TOLERANCE_M {
+        let (path, from) = (path.display(), reader.from);
         return Err(reported(format!("{path}:{line}: begins at {value} m, where the axis is at {from} m")));
     }
     Ok(Arc::new(Table::new(&points, smooth)))
 }
 
-/// What the file's values are, by its header; for a row that begins with a table.
+/// Quantity of the file's values, by its header; for a row that begins with a table.
 pub(super) fn quantity_of(path: &Path) -> Option<Quantity> {
     points_of(path).ok().map(|(quantity, _)| quantity)
 }
@@ -127,7 +127,7 @@ impl Table {
 }
 
 impl Law for Table {
-    fn at(&self, time_s: f64) -> Moment {
+    fn at(&self, time_s: f64) -> ProfilePoint {
         let next = self.times_s.partition_point(|time| *time <= time_s).clamp(1, self.times_s.len() - 1);
         let [begin_s, end_s] = [self.times_s[next - 1], self.times_s[next]];
         let [from, to] = [self.values[next - 1], self.values[next]];
@@ -135,14 +135,19 @@ impl Law for Table {
         let z = ((time_s - begin_s) / length_s).clamp(0.0, 1.0);
         let moving = way != 0.0;
         let Some(rates) = &self.rates else {
-            return Moment { value: from + way * z, rate: way / length_s, acceleration: 0.0, moving };
+            return ProfilePoint { value: from + way * z, rate: way / length_s, acceleration: 0.0, moving };
         };
         // Hermite: x = from + way (3 z^2 - 2 z^3) + T (r0 (z^3 - 2 z^2 + z) + r1 (z^3 - z^2)).
         let [r0, r1] = [rates[next - 1] * length_s, rates[next] * length_s];
         let value = from + z * (r0 + z * (3.0 * way - 2.0 * r0 - r1 + z * (r0 + r1 - 2.0 * way)));
         let rate = r0 + z * (2.0 * (3.0 * way - 2.0 * r0 - r1) + z * 3.0 * (r0 + r1 - 2.0 * way));
         let acceleration = 2.0 * (3.0 * way - 2.0 * r0 - r1) + z * 6.0 * (r0 + r1 - 2.0 * way);
-        Moment { value, rate: rate / length_s, acceleration: acceleration / (length_s * length_s), moving }
+        ProfilePoint {
+            value,
+            rate: rate / length_s,
+            acceleration: acceleration / (length_s * length_s),
+            moving,
+        }
     }
 
     fn extent(&self) -> Extent {

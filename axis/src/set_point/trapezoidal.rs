@@ -9,7 +9,7 @@
 //!
 //! d: way, m. v: velocity_m_per_s. a: acceleration_m_per_s2. Acceleration jumps at the four corners.
 
-use super::law::{Extent, Kind, Law, Moment};
+use super::law::{Extent, Kind, Law, ProfilePoint};
 use algorithms::algorithm::Quantity;
 use settings::parameters::Parameter;
 use std::sync::Arc;
@@ -18,10 +18,10 @@ pub const KIND: Kind = Kind {
     name: "trapezoidal",
     about: "trapezoidal velocity to a place; the time follows from the way",
     serves: &[Quantity::Position],
-    read: |given| {
-        let to = given.place("to", "where it ends")?;
-        let (velocity, acceleration) = (given.number(&VELOCITY)?, given.number(&ACCELERATION)?);
-        Ok(Arc::new(Trapezoidal::new([given.from, to], velocity, acceleration)))
+    read: |reader| {
+        let to = reader.value("to", "where it ends")?;
+        let (velocity, acceleration) = (reader.number(&VELOCITY)?, reader.number(&ACCELERATION)?);
+        Ok(Arc::new(Trapezoidal::new([reader.from, to], velocity, acceleration)))
     },
 };
 
@@ -52,20 +52,20 @@ impl Trapezoidal {
 }
 
 impl Law for Trapezoidal {
-    fn at(&self, time_s: f64) -> Moment {
+    fn at(&self, time_s: f64) -> ProfilePoint {
         let Self { from, to, acceleration, ramp_s, duration_s } = *self;
         let left_s = duration_s - time_s;
-        let moment = |value, rate, acceleration| Moment { value, rate, acceleration, moving: true };
+        let point = |value, rate, acceleration| ProfilePoint { value, rate, acceleration, moving: true };
         if time_s < ramp_s {
             let rate = acceleration * time_s;
-            return moment(from + 0.5 * rate * time_s, rate, acceleration);
+            return point(from + 0.5 * rate * time_s, rate, acceleration);
         }
         if left_s < ramp_s {
             let rate = acceleration * left_s;
-            return moment(to - 0.5 * rate * left_s, rate, -acceleration);
+            return point(to - 0.5 * rate * left_s, rate, -acceleration);
         }
         let rate = acceleration * ramp_s;
-        moment(from + rate * (time_s - 0.5 * ramp_s), rate, 0.0)
+        point(from + rate * (time_s - 0.5 * ramp_s), rate, 0.0)
     }
 
     fn extent(&self) -> Extent {

@@ -31,13 +31,13 @@ fn controllers(experiment: &str, load: &str, set: &[&str]) -> Result<Vec<AxisCon
         ..FileArguments::default()
     });
     let inputs = inputs.map_err(|error| error.to_string())?;
-    let made = Axis::ALL.map(|axis| inputs.controller(axis, MODE).map_err(|error| error.to_string()));
-    made.into_iter().collect()
+    let controllers = Axis::ALL.map(|axis| inputs.controller(axis, MODE).map_err(|error| error.to_string()));
+    controllers.into_iter().collect()
 }
 
 #[track_caller]
-fn expect_refused(made: Result<Vec<AxisController>, String>, words: &[&str]) {
-    let Err(problem) = made else { panic!("was taken") };
+fn expect_refused(controllers: Result<Vec<AxisController>, String>, words: &[&str]) {
+    let Err(problem) = controllers else { panic!("was taken") };
     for word in words {
         assert!(problem.contains(word), "'{word}' is missing in: {problem}");
     }
@@ -64,7 +64,7 @@ fn every_shipped_program_of_forces_gives_way() {
         let source = Source::read(&file.unwrap().path()).unwrap();
         let program = source.program(Axis::Load, &RigParameters::baseline(), false).unwrap();
         if program.controls() == Quantity::Force {
-            assert!(program.gives_way(), "{}", source.path.display());
+            assert!(program.has_force_chain_slot(), "{}", source.path.display());
             seen += 1;
         }
     }
@@ -87,8 +87,8 @@ fn what_is_read_at_the_start_only_may_be_set_but_no_change_of_it_planned() {
         let words = ["experiment.toml:11", name.split('.').next_back().unwrap(), "at the start only"];
         expect_refused(controllers(&change(name, value), LOAD, &[]), &words);
         let set = format!("load.{name}={value}");
-        let made = controllers(EXPERIMENT, LOAD, &[&set]).unwrap();
-        let program = &made[1].program;
+        let controllers = controllers(EXPERIMENT, LOAD, &[&set]).unwrap();
+        let program = &controllers[1].program;
         assert_eq!(program.values()[program.place(name).unwrap()], value);
     }
     assert!(controllers(&change("force-chain.high_force_n", 90.0), LOAD, &[]).is_ok());

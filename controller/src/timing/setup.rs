@@ -1,7 +1,7 @@
 //! Creates both sides of the timing of a run before its threads start.
 
 use super::queues::TimingQueues;
-use super::{Outlets, Stopwatch};
+use super::{Stopwatch, TimingSenders};
 use crate::cli::RunArguments;
 use crate::report;
 use crate::run::RunError;
@@ -45,7 +45,7 @@ pub(crate) fn begin(
 ) -> Result<(Stopwatch<MonotonicClock>, TimingQueues), RunError> {
     let (measured_sender, measured) = bounded(MEASURED_QUEUE);
     let (frame_sender, frames) = bounded(FRAME_QUEUE);
-    let outlets = Outlets { measured: measured_sender, frames: frame_sender };
+    let senders = TimingSenders { measured: measured_sender, frames: frame_sender };
     let interface = arguments.bus.interface().unwrap_or(EMBEDDED_INTERFACE);
     let recorder = TimingRecorder::create(TimingSetup {
         folder: arguments.files.out.clone(),
@@ -60,5 +60,5 @@ pub(crate) fn begin(
     });
     let recorder = recorder.map_err(RunError::output)?;
     let queues = TimingQueues { measured, frames, freeze, recorder };
-    Ok((Stopwatch::new(MonotonicClock, arguments.axis.list(), outlets), queues))
+    Ok((Stopwatch::new(MonotonicClock, arguments.axis.list(), senders), queues))
 }

@@ -14,15 +14,15 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Time passes when the test says so.
 #[derive(Clone, Default)]
-struct Moved(Arc<AtomicU64>);
+struct ManualClock(Arc<AtomicU64>);
 
-impl Moved {
+impl ManualClock {
     fn pass(&self, ns: u64) {
         self.0.fetch_add(ns, Ordering::Relaxed);
     }
 }
 
-impl Clock for Moved {
+impl Clock for ManualClock {
     fn now(&self) -> Instant {
         Instant::from_nanos(self.0.load(Ordering::Relaxed))
     }
@@ -34,7 +34,7 @@ impl Clock for Moved {
 
 /// Sends in 3 ns, or not at all.
 struct Wire {
-    clock: Moved,
+    clock: ManualClock,
     full: bool,
 }
 
@@ -47,21 +47,21 @@ impl FrameSink for Wire {
 }
 
 struct Bench {
-    clock: Moved,
+    clock: ManualClock,
     wire: Wire,
-    stopwatch: Stopwatch<Moved>,
+    stopwatch: Stopwatch<ManualClock>,
     measured: Receiver<TimingSample>,
     frames: Receiver<StampedFrame>,
 }
 
 impl Bench {
     fn new(axes: &[Axis]) -> Self {
-        let clock = Moved::default();
+        let clock = ManualClock::default();
         clock.pass(1_000_000);
         let (measured_sender, measured) = bounded(64);
         let (frame_sender, frames) = bounded(64);
-        let outlets = Outlets { measured: measured_sender, frames: frame_sender };
-        let stopwatch = Stopwatch::new(clock.clone(), axes, outlets);
+        let senders = TimingSenders { measured: measured_sender, frames: frame_sender };
+        let stopwatch = Stopwatch::new(clock.clone(), axes, senders);
         let wire = Wire { clock: clock.clone(), full: false };
         Self { clock, wire, stopwatch, measured, frames }
     }
@@ -331,7 +331,7 @@ fn both_axes() -> ControllerNode {
     let (records, _) = bounded(64);
     let (news, _) = bounded(64);
     let (_, changes) = bounded(1);
-    ControllerNode::new(controllers.into(), node::Outlets { records, news, changes, waits: false })
+    ControllerNode::new(controllers.into(), node::NodeQueues { records, news, changes, waits: false })
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::build::{Libraries, trier};
 use crate::laws;
 use crate::position_pi::KIND;
-use algorithms::algorithm::{Algorithm, Quantity, Ready};
+use algorithms::algorithm::{Algorithm, AlgorithmInput, Quantity};
 use algorithms::guard::Guarded;
 use algorithms::linearisation::{Law, Linearisation};
 use plant::{Inputs, Plant, RigParameters, Sensors, Setup};
@@ -29,17 +29,17 @@ fn drive_to(target_m: f64, change: impl Fn(&mut [f64])) -> Vec<f64> {
     let mut plant = Plant::new(&rig, &Setup::default()).unwrap();
     let mut sensors = Sensors::new(&rig, 1);
     let mut inputs = Inputs::default();
-    let mut ready = Ready { period_s: 0.001, set_position_m: target_m, ..Ready::default() };
+    let mut input = AlgorithmInput { period_s: 0.001, set_position_m: target_m, ..AlgorithmInput::default() };
     (0..5000)
         .map(|cycle| {
-            ready.position_m = sensors.sample(&plant, &inputs)[0].position.value;
+            input.position_m = sensors.sample(&plant, &inputs)[0].position.value;
             if cycle == 0 {
-                guarded.reset(&ready, &values).unwrap();
+                guarded.reset(&input, &values).unwrap();
             }
-            let wanted = guarded.step(&ready, &values).unwrap();
-            let largest = linearisation.velocity(1.0f64.copysign(wanted), &ready).abs();
-            ready.applied_velocity_m_per_s = wanted.clamp(-largest, largest);
-            inputs.valve[0] = linearisation.opening(ready.applied_velocity_m_per_s, &ready);
+            let wanted = guarded.step(&input, &values).unwrap();
+            let largest = linearisation.velocity(1.0f64.copysign(wanted), &input).abs();
+            input.applied_velocity_m_per_s = wanted.clamp(-largest, largest);
+            inputs.valve[0] = linearisation.opening(input.applied_velocity_m_per_s, &input);
             plant.step(&inputs);
             plant.state().axes[0].extension_m
         })
@@ -84,12 +84,12 @@ fn a_step_through_the_library_allocates_nothing() {
     let plugin = example();
     let values = defaults(&plugin);
     let mut guarded = Guarded::new(Box::new(plugin), Some(Box::new(MonotonicClock)));
-    let ready = Ready { period_s: 0.001, set_position_m: 0.1, ..Ready::default() };
-    guarded.reset(&ready, &values).unwrap();
+    let input = AlgorithmInput { period_s: 0.001, set_position_m: 0.1, ..AlgorithmInput::default() };
+    guarded.reset(&input, &values).unwrap();
     let (before, sum) = {
         let _watch = allocations::watch();
         let before = allocations::counted();
-        (before, (0..1000).map(|_| guarded.step(&ready, &values).unwrap_or(0.0)).sum::<f64>())
+        (before, (0..1000).map(|_| guarded.step(&input, &values).unwrap_or(0.0)).sum::<f64>())
     };
     assert_eq!(allocations::counted(), before);
     assert!(sum > 0.0);
@@ -102,20 +102,20 @@ fn two_instances_of_one_library_have_their_own_state() {
     let load = || load_tried_by(&trier(), &library, &RigParameters::baseline()).unwrap();
     let (mut one, mut other) = (load(), load());
     let values = defaults(&one);
-    let ready = Ready { period_s: 0.001, set_position_m: 0.1, ..Ready::default() };
-    one.reset(&ready, &values);
-    other.reset(&ready, &values);
-    let first = one.step(&ready, &values);
+    let input = AlgorithmInput { period_s: 0.001, set_position_m: 0.1, ..AlgorithmInput::default() };
+    one.reset(&input, &values);
+    other.reset(&input, &values);
+    let first = one.step(&input, &values);
     (0..100).for_each(|_| {
-        one.step(&ready, &values);
+        one.step(&input, &values);
     });
-    assert_eq!(other.step(&ready, &values), first);
+    assert_eq!(other.step(&input, &values), first);
 }
 
 #[test]
 #[should_panic(expected = "a value for each parameter")]
 fn fewer_values_than_parameters_are_a_bug_and_never_reach_the_library() {
-    let _ = example().step(&Ready::default(), &[1.0]);
+    let _ = example().step(&AlgorithmInput::default(), &[1.0]);
 }
 
 #[test]
@@ -131,14 +131,14 @@ fn the_example_in_rust_gives_the_same_bits_and_is_the_text_of_the_document() {
     let values = defaults(&in_c);
     assert_eq!(in_c.description.parameters, KIND.parameters, "the tables");
     let mut in_rust = (KIND.make)(&RigParameters::baseline());
-    let mut ready = Ready { period_s: 0.001, ..Ready::default() };
-    in_rust.reset(&ready, &values);
-    in_c.reset(&ready, &values);
+    let mut input = AlgorithmInput { period_s: 0.001, ..AlgorithmInput::default() };
+    in_rust.reset(&input, &values);
+    in_c.reset(&input, &values);
     for cycle in 0..2000 {
-        ready.set_position_m = 0.2 + 0.05 * f64::from(cycle % 300) / 300.0;
-        ready.position_m += 0.001 * ready.applied_velocity_m_per_s;
-        let results = [in_rust.step(&ready, &values), in_c.step(&ready, &values)];
+        input.set_position_m = 0.2 + 0.05 * f64::from(cycle % 300) / 300.0;
+        input.position_m += 0.001 * input.applied_velocity_m_per_s;
+        let results = [in_rust.step(&input, &values), in_c.step(&input, &values)];
         assert_eq!(results[0].to_bits(), results[1].to_bits(), "step {cycle}: {results:?}");
-        ready.applied_velocity_m_per_s = results[0].clamp(-0.8, 0.8);
+        input.applied_velocity_m_per_s = results[0].clamp(-0.8, 0.8);
     }
 }

@@ -1,7 +1,7 @@
 //! Libraries that pass their trial and fail later: the watch latches and nothing of theirs leaves any more.
 
 use crate::build::{Libraries, trier};
-use algorithms::algorithm::Ready;
+use algorithms::algorithm::AlgorithmInput;
 use algorithms::guard::{AlgorithmFault, Guarded, LONGEST_ONCE};
 use nominal::RigParameters;
 use plugin::load_tried_by;
@@ -14,7 +14,7 @@ fn after_999_steps(libraries: &Libraries, options: &[&str], real_time: bool) -> 
     let plugin = load_tried_by(&trier(), &libraries.hostile(&all), &RigParameters::baseline()).unwrap();
     let mut guarded =
         Guarded::new(Box::new(plugin), if real_time { Some(Box::new(MonotonicClock)) } else { None });
-    guarded.reset(&Ready::default(), &[1.0, 1.0]).unwrap();
+    guarded.reset(&AlgorithmInput::default(), &[1.0, 1.0]).unwrap();
     for _ in 1..1000 {
         assert_eq!(step(&mut guarded), Ok(0.1));
     }
@@ -22,7 +22,7 @@ fn after_999_steps(libraries: &Libraries, options: &[&str], real_time: bool) -> 
 }
 
 fn step(guarded: &mut Guarded) -> Result<f64, AlgorithmFault> {
-    guarded.step(&Ready::default(), &[1.0, 1.0])
+    guarded.step(&AlgorithmInput::default(), &[1.0, 1.0])
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn what_is_no_number_in_the_thousandth_step_latches_until_the_restart() {
         // The library would give good results again.
         assert_eq!(step(&mut guarded), Err(AlgorithmFault::NotANumber));
         guarded.restart();
-        guarded.reset(&Ready::default(), &[1.0, 1.0]).unwrap();
+        guarded.reset(&AlgorithmInput::default(), &[1.0, 1.0]).unwrap();
         assert_eq!(step(&mut guarded), Ok(0.1));
     }
 }

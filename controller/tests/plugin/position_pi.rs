@@ -1,6 +1,6 @@
 //! Position: proportional-integral with velocity feed-forward.
 
-use crate::algorithm::{ControlLaw, Kind, LARGEST_M_PER_S, Quantity, Ready};
+use crate::algorithm::{AlgorithmInput, ControlLaw, Kind, LARGEST_M_PER_S, Quantity};
 use settings::parameters::declare;
 
 /// In the list of algorithms.
@@ -32,20 +32,20 @@ struct PositionPi {
 impl ControlLaw for PositionPi {
     type Parameters = Parameters;
 
-    fn reset(&mut self, ready: &Ready, _: &Parameters) {
-        *self = Self { integral_m_per_s: 0.0, last_result_m_per_s: ready.applied_velocity_m_per_s };
+    fn reset(&mut self, input: &AlgorithmInput, _: &Parameters) {
+        *self = Self { integral_m_per_s: 0.0, last_result_m_per_s: input.applied_velocity_m_per_s };
     }
 
-    fn step(&mut self, ready: &Ready, p: &Parameters) -> f64 {
-        let error = ready.set_position_m - ready.position_m;
+    fn step(&mut self, input: &AlgorithmInput, p: &Parameters) -> f64 {
+        let error = input.set_position_m - input.position_m;
         let entering = if error.abs() > p.dead_zone_m { error } else { 0.0 };
-        let limited = ready.applied_velocity_m_per_s - self.last_result_m_per_s;
+        let limited = input.applied_velocity_m_per_s - self.last_result_m_per_s;
         let rate = p.gain_per_s / p.integral_time_s * entering + limited / p.tracking_time_s;
-        let integral = self.integral_m_per_s + ready.period_s * rate;
+        let integral = self.integral_m_per_s + input.period_s * rate;
         self.integral_m_per_s = integral.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         let result = p.gain_per_s * error
             + self.integral_m_per_s
-            + p.velocity_feed_forward * ready.set_velocity_m_per_s;
+            + p.velocity_feed_forward * input.set_velocity_m_per_s;
         self.last_result_m_per_s = result.clamp(-LARGEST_M_PER_S, LARGEST_M_PER_S);
         self.last_result_m_per_s
     }

@@ -9,7 +9,7 @@ use figures::series::Series;
 use figures::tables_read::{Table, enter};
 use figures::{self, Figures, position};
 use plant::{Axis, Scene};
-use rehearsal::Rehearsed;
+use rehearsal::RehearsalRow;
 use std::error::Error;
 use std::path::Path;
 
@@ -75,7 +75,7 @@ pub fn figures(run: &Run) -> impl Fn(&str) -> Option<f64> + use<> {
     }
 }
 
-fn time_s(row: &Rehearsed) -> f64 {
+fn time_s(row: &RehearsalRow) -> f64 {
     row.cycle.cycle as f64 * 1e-3
 }
 

@@ -15,8 +15,8 @@
 
 use crate::{Trial, TrialError, largest_factor, means, peak_to_peak};
 use algorithms::guard::AlgorithmFault;
-use axis_control::program::{Demand, Hand, Program};
-use axis_control::set_point::{ForceSetPoint, SetPoint, SmoothWay};
+use axis_control::program::{ActiveAlgorithm, Demand, Program};
+use axis_control::set_point::{ForceSetPoint, SetPoint, SmoothTransition};
 use plant::{Inputs, Plant, RigParameters, Setup, quantise_valve};
 use protocol::frames::Sensors;
 use std::collections::VecDeque;
@@ -109,12 +109,13 @@ fn attempt_late(
         cycle: 0,
     };
     let mut figures = Figures::default();
-    bench.follow(&mut program, SmoothWay::new(START_M, START_M, 0.0), 0.5)?;
+    bench.follow(&mut program, SmoothTransition::new(START_M, START_M, 0.0), 0.5)?;
     let mut from_m = START_M;
     for part in moves {
-        let way = SmoothWay::new(from_m, part.to_m, part.duration_s);
+        let way = SmoothTransition::new(from_m, part.to_m, part.duration_s);
         let moving = bench.follow(&mut program, way, part.duration_s)?;
-        let resting = bench.follow(&mut program, SmoothWay::new(part.to_m, part.to_m, 0.0), part.rest_s)?;
+        let resting =
+            bench.follow(&mut program, SmoothTransition::new(part.to_m, part.to_m, 0.0), part.rest_s)?;
         figures.take_move(&moving);
         figures.take_rest(&resting);
         if part.duration_s == 0.0 {
@@ -152,7 +153,7 @@ impl Bench {
     fn follow(
         &mut self,
         program: &mut Program,
-        way: SmoothWay,
+        way: SmoothTransition,
         duration_s: f64,
     ) -> Result<Vec<f64>, AlgorithmFault> {
         let cycles = (duration_s * 1e3).round() as usize;
@@ -173,7 +174,7 @@ impl Bench {
         };
         program.observe(self.cycle, &sensors, self.plant.supply_pressure_pa());
         let demand = Demand { position, force: ForceSetPoint::at_rest(0.0) };
-        let output = program.control(self.cycle, &demand, Hand::User)?;
+        let output = program.control(self.cycle, &demand, ActiveAlgorithm::User)?;
         self.commands.push_back(quantise_valve(output.opening));
         self.plant.step(&inputs);
         self.cycle += 1;

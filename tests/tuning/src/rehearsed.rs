@@ -16,7 +16,7 @@ use super::{Trial, TrialError, in_parallel, means, peak_to_peak};
 use axis_control::setup::{Inputs, Mode};
 use plant::{Axis, Scene};
 use protocol::frames::MainChainState;
-use rehearsal::{Rehearsal, RehearsalParts, Rehearsed};
+use rehearsal::{Rehearsal, RehearsalParts, RehearsalRow};
 
 /// Largest movement at rest that is no oscillation, m.
 pub const STILL_M: f64 = 2e-4;
@@ -35,7 +35,7 @@ const SMOOTH_N: usize = 5;
 const SLOW: usize = 100;
 
 pub struct Run {
-    pub rows: Vec<Rehearsed>,
+    pub rows: Vec<RehearsalRow>,
     pub done: bool,
 }
 
@@ -103,18 +103,18 @@ fn is_still(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<bool, Trial
 
 impl Run {
     pub fn unrest(&self) -> Unrest {
-        let drive = |row: &Rehearsed| row.axes[Axis::Drive.index()];
+        let drive = |row: &RehearsalRow| row.axes[Axis::Drive.index()];
         let in_experiment =
-            |row: &&Rehearsed| drive(row).is_some_and(|drive| drive.main == MainChainState::Experiment);
+            |row: &&RehearsalRow| drive(row).is_some_and(|drive| drive.main == MainChainState::Experiment);
         let rows: Vec<_> = self.rows.iter().filter(in_experiment).collect();
-        let column = |of: fn(&Rehearsed) -> f64| rows.iter().map(|row| of(row)).collect::<Vec<_>>();
+        let column = |of: fn(&RehearsalRow) -> f64| rows.iter().map(|row| of(row)).collect::<Vec<_>>();
         let position = column(|row| row.cycle.readings[Axis::Drive.index()].position.value);
         let force = column(|row| row.cycle.readings[Axis::Load.index()].force.value);
         let least = |values: &[f64], smooth| {
             let windows = values.rchunks(WINDOW).take(3);
             windows.map(|window| peak_to_peak(&means(window, smooth))).fold(f64::INFINITY, f64::min)
         };
-        let moves = |row: &&&Rehearsed| {
+        let moves = |row: &&&RehearsalRow| {
             drive(row).and_then(|drive| drive.set_position).is_some_and(|point| point.moving)
         };
         let rest_from = rows.len() - rows.iter().rev().take_while(|row| !moves(row)).count();

@@ -15,15 +15,15 @@ fn cycles_of(name: &str) -> u64 {
     cycles(parameter.default)
 }
 
-struct Play {
+struct ChainBench {
     chain: ForceChain,
     inputs: ForceInputs,
     values: Vec<f64>,
 }
 
-impl Play {
-    fn new(asked: ForceAsked) -> Self {
-        let inputs = ForceInputs { asked, ..ForceInputs::default() };
+impl ChainBench {
+    fn new(request: ForceRequest) -> Self {
+        let inputs = ForceInputs { request, ..ForceInputs::default() };
         Self { chain: ForceChain::default(), inputs, values: defaults() }
     }
 
@@ -39,80 +39,80 @@ impl Play {
 
     /// A chain in a state of manual mode.
     fn to(state: S) -> Self {
-        let mut play = Self::new(ForceAsked::Manual);
-        play.inputs.force_n = 50.0;
-        play.next();
-        while play.chain.entered.state != state {
-            play.inputs.velocity_m_per_s = if state == S::Moving { 0.1 } else { 0.0 };
-            play.next();
+        let mut bench = Self::new(ForceRequest::Manual);
+        bench.inputs.force_n = 50.0;
+        bench.next();
+        while bench.chain.entered.state != state {
+            bench.inputs.velocity_m_per_s = if state == S::Moving { 0.1 } else { 0.0 };
+            bench.next();
         }
-        play
+        bench
     }
 }
 
 #[test]
 fn a_high_force_limits_the_velocity_at_first() {
-    let mut play = Play::new(ForceAsked::Manual);
-    play.inputs.force_n = -81.0;
-    let output = play.step();
+    let mut bench = ChainBench::new(ForceRequest::Manual);
+    bench.inputs.force_n = -81.0;
+    let output = bench.step();
     assert_eq!((output.state, output.limit_m_per_s), (S::Limited, Some(0.02)));
     assert!(!output.feed_forward && !output.dead_zone);
-    assert_eq!(play.next(), (100_000, S::Limited));
-    play.inputs.force_n = -79.0;
+    assert_eq!(bench.next(), (100_000, S::Limited));
+    bench.inputs.force_n = -79.0;
     // The first low sample, and 50 ms.
-    assert_eq!(play.next(), (51, S::Standstill));
-    play.inputs.force_n = 1000.0;
-    assert_eq!(play.next(), (100_000, S::Standstill), "only at first");
+    assert_eq!(bench.next(), (51, S::Standstill));
+    bench.inputs.force_n = 1000.0;
+    assert_eq!(bench.next(), (100_000, S::Standstill), "only at first");
 }
 
 #[test]
 fn a_force_that_is_low_for_a_moment_stays_limited() {
-    let mut play = Play::new(ForceAsked::Manual);
+    let mut bench = ChainBench::new(ForceRequest::Manual);
     for cycle in 0..1000 {
-        play.inputs.force_n = if cycle % 50 == 0 { 81.0 } else { 0.0 };
-        assert_eq!(play.step().state, S::Limited);
+        bench.inputs.force_n = if cycle % 50 == 0 { 81.0 } else { 0.0 };
+        assert_eq!(bench.step().state, S::Limited);
     }
 }
 
 #[test]
 fn significant_movement_has_a_hysteresis_in_velocity_and_time() {
-    let mut play = Play::to(S::Standstill);
-    play.inputs.velocity_m_per_s = 0.0099;
-    assert_eq!(play.next(), (100_000, S::Standstill));
-    play.inputs.velocity_m_per_s = -0.0101;
-    assert_eq!(play.next(), (21, S::Moving));
-    play.inputs.velocity_m_per_s = -0.0051;
-    assert_eq!(play.next(), (100_000, S::Moving));
+    let mut bench = ChainBench::to(S::Standstill);
+    bench.inputs.velocity_m_per_s = 0.0099;
+    assert_eq!(bench.next(), (100_000, S::Standstill));
+    bench.inputs.velocity_m_per_s = -0.0101;
+    assert_eq!(bench.next(), (21, S::Moving));
+    bench.inputs.velocity_m_per_s = -0.0051;
+    assert_eq!(bench.next(), (100_000, S::Moving));
     // The mean velocity of 5.1 mm/s comes to 5 mm/s within 150 ms ln(5.1/5) = 3 ms at rest, and stays for 100 ms.
-    play.inputs.velocity_m_per_s = 0.0;
-    let (cycles, state) = play.next();
+    bench.inputs.velocity_m_per_s = 0.0;
+    let (cycles, state) = bench.next();
     assert!((101..110).contains(&cycles) && state == S::Standstill, "{cycles} {state}");
 }
 
 #[test]
 fn a_rod_that_bounces_within_the_gap_goes_nowhere() {
-    let mut play = Play::to(S::Moving);
+    let mut bench = ChainBench::to(S::Moving);
     // 10 mm/s to and fro, 40 ms each way: 0.4 mm, twice the gap.
     let still = (0..2000_u64).any(|cycle| {
-        play.inputs.velocity_m_per_s = if cycle % 80 < 40 { 0.01 } else { -0.01 };
-        play.step().state == S::Standstill
+        bench.inputs.velocity_m_per_s = if cycle % 80 < 40 { 0.01 } else { -0.01 };
+        bench.step().state == S::Standstill
     });
     assert!(still);
 }
 
 #[test]
 fn noise_of_the_velocity_moves_nothing() {
-    let mut play = Play::to(S::Standstill);
+    let mut bench = ChainBench::to(S::Standstill);
     for cycle in 0..1000 {
-        play.inputs.velocity_m_per_s = if cycle % 20 == 0 { 0.0 } else { 0.02 };
-        assert_eq!(play.step().state, S::Standstill);
+        bench.inputs.velocity_m_per_s = if cycle % 20 == 0 { 0.0 } else { 0.02 };
+        assert_eq!(bench.step().state, S::Standstill);
     }
 }
 
 #[test]
 fn the_case_distinction_is_feed_forward_or_a_dead_zone() {
     for (state, feed_forward, dead_zone) in [(S::Standstill, false, true), (S::Moving, true, false)] {
-        let output = Play::to(state).step();
+        let output = ChainBench::to(state).step();
         assert_eq!((output.feed_forward, output.dead_zone), (feed_forward, dead_zone), "{state}");
         assert_eq!((output.limit_m_per_s, output.set_force_n), (None, Some(0.0)));
     }
@@ -120,32 +120,32 @@ fn the_case_distinction_is_feed_forward_or_a_dead_zone() {
 
 #[test]
 fn a_low_mean_force_at_standstill_is_relieved() {
-    let mut play = Play::new(ForceAsked::Relieve);
-    play.inputs.force_n = 19.0;
-    assert_eq!(play.next().1, S::Limited);
-    assert_eq!(play.next().1, S::Standstill);
-    assert_eq!(play.next(), (301, S::Done));
-    let output = play.step();
+    let mut bench = ChainBench::new(ForceRequest::Relieve);
+    bench.inputs.force_n = 19.0;
+    assert_eq!(bench.next().1, S::Limited);
+    assert_eq!(bench.next().1, S::Standstill);
+    assert_eq!(bench.next(), (301, S::Done));
+    let output = bench.step();
     assert!(output.relieved && output.dead_zone && !output.feed_forward);
     assert_eq!(output.set_force_n, Some(0.0));
 }
 
 #[test]
 fn a_force_that_swings_is_not_relieved() {
-    let mut play = Play::new(ForceAsked::Relieve);
+    let mut bench = ChainBench::new(ForceRequest::Relieve);
     for cycle in 0..7000_u64 {
         // A swing of 200 ms, which a mean over 50 ms still shows.
-        play.inputs.force_n = if cycle % 200 < 100 { 70.0 } else { -70.0 };
-        play.step();
+        bench.inputs.force_n = if cycle % 200 < 100 { 70.0 } else { -70.0 };
+        bench.step();
     }
-    assert_eq!(play.chain.entered.state, S::Standstill);
+    assert_eq!(bench.chain.entered.state, S::Standstill);
 }
 
 #[test]
 fn manual_mode_is_never_done() {
-    let mut play = Play::to(S::Standstill);
-    play.inputs.force_n = 0.0;
-    assert_eq!(play.next(), (100_000, S::Standstill));
+    let mut bench = ChainBench::to(S::Standstill);
+    bench.inputs.force_n = 0.0;
+    assert_eq!(bench.next(), (100_000, S::Standstill));
 }
 
 #[test]
@@ -153,45 +153,45 @@ fn a_relief_that_takes_too_long_is_a_fault_from_each_state() {
     for (force_n, velocity_m_per_s, last) in
         [(500.0, 0.0, S::Limited), (70.0, 0.0, S::Standstill), (70.0, 0.1, S::Moving)]
     {
-        let mut play = Play::new(ForceAsked::Relieve);
-        (play.inputs.force_n, play.inputs.velocity_m_per_s) = (force_n, velocity_m_per_s);
+        let mut bench = ChainBench::new(ForceRequest::Relieve);
+        (bench.inputs.force_n, bench.inputs.velocity_m_per_s) = (force_n, velocity_m_per_s);
         let mut before = S::Idle;
-        while play.chain.entered.state != S::Fault {
-            before = play.chain.entered.state;
-            play.next();
+        while bench.chain.entered.state != S::Fault {
+            before = bench.chain.entered.state;
+            bench.next();
         }
         assert_eq!(before, last);
-        assert_eq!(play.step().fault, Some(Fault::RelieveTimeout));
-        let cycles = play.chain.entered.cycle;
+        assert_eq!(bench.step().fault, Some(Fault::RelieveTimeout));
+        let cycles = bench.chain.entered.cycle;
         let timeout = cycles_of("relieve_timeout_s");
         assert!((timeout..=timeout + 3).contains(&cycles), "{last}: {cycles}");
-        play.inputs.asked = ForceAsked::Manual;
-        assert_eq!(play.step().state, S::Fault);
-        play.inputs.asked = ForceAsked::Idle;
-        assert_eq!(play.step().state, S::Idle);
+        bench.inputs.request = ForceRequest::Manual;
+        assert_eq!(bench.step().state, S::Fault);
+        bench.inputs.request = ForceRequest::Idle;
+        assert_eq!(bench.step().state, S::Idle);
     }
 }
 
 #[test]
 fn what_is_asked_names_the_rest_from_everywhere() {
     let asks = [
-        (ForceAsked::Idle, S::Idle),
-        (ForceAsked::InitialRamp, S::InitialRamp),
-        (ForceAsked::LoadProfile, S::LoadProfile),
-        (ForceAsked::Done, S::Done),
-        (ForceAsked::Relieve, S::Limited),
-        (ForceAsked::Manual, S::Limited),
+        (ForceRequest::Idle, S::Idle),
+        (ForceRequest::InitialRamp, S::InitialRamp),
+        (ForceRequest::LoadProfile, S::LoadProfile),
+        (ForceRequest::Done, S::Done),
+        (ForceRequest::Relieve, S::Limited),
+        (ForceRequest::Manual, S::Limited),
     ];
     for (first, _) in asks {
-        for (asked, state) in asks {
-            let mut play = Play::new(first);
+        for (request, state) in asks {
+            let mut bench = ChainBench::new(first);
             for _ in 0..200 {
-                play.step();
+                bench.step();
             }
-            play.inputs.asked = asked;
-            let output = play.step();
-            if first != asked {
-                assert_eq!(output.state, state, "{first:?} {asked:?}");
+            bench.inputs.request = request;
+            let output = bench.step();
+            if first != request {
+                assert_eq!(output.state, state, "{first:?} {request:?}");
                 assert_eq!(output.set_force_n.is_some(), state == S::Limited);
                 assert!(!output.relieved);
             }
@@ -201,29 +201,29 @@ fn what_is_asked_names_the_rest_from_everywhere() {
 
 #[test]
 fn parameters_act_at_once() {
-    let mut play = Play::to(S::Standstill);
-    play.inputs.velocity_m_per_s = 0.005;
-    play.step();
-    play.values[3] = 0.004;
-    assert_eq!(play.next(), (21, S::Moving));
+    let mut bench = ChainBench::to(S::Standstill);
+    bench.inputs.velocity_m_per_s = 0.005;
+    bench.step();
+    bench.values[3] = 0.004;
+    assert_eq!(bench.next(), (21, S::Moving));
 }
 
 #[test]
 fn skipped_cycles_pass() {
-    let mut play = Play::to(S::Standstill);
-    play.inputs.velocity_m_per_s = 0.1;
-    play.step();
-    play.inputs.cycle += 19;
-    assert_eq!(play.step().state, S::Moving);
+    let mut bench = ChainBench::to(S::Standstill);
+    bench.inputs.velocity_m_per_s = 0.1;
+    bench.step();
+    bench.inputs.cycle += 19;
+    assert_eq!(bench.step().state, S::Moving);
 }
 
 #[test]
 fn a_new_rig_makes_idle() {
-    let mut play = Play::to(S::Moving);
-    play.chain.restart(7);
-    assert_eq!(play.chain.entered, Entered { cycle: 7, state: S::Idle, cause: ForceCause::Began });
-    play.inputs.cycle = 7;
-    assert_eq!(play.step().state, S::Limited, "what is asked is asked anew");
+    let mut bench = ChainBench::to(S::Moving);
+    bench.chain.restart(7);
+    assert_eq!(bench.chain.entered, StateEntry { cycle: 7, state: S::Idle, cause: ForceCause::Began });
+    bench.inputs.cycle = 7;
+    assert_eq!(bench.step().state, S::Limited, "what is asked is asked anew");
 }
 
 #[test]
@@ -241,22 +241,22 @@ proptest! {
             1..400,
         ),
     ) {
-        let mut play = Play::new(ForceAsked::Relieve);
-        for (cycles, asked, force_n, velocity_m_per_s) in row {
-            play.inputs.cycle += cycles;
-            play.inputs.force_n = force_n;
-            play.inputs.velocity_m_per_s = velocity_m_per_s;
-            play.inputs.asked = match asked {
-                0 => ForceAsked::Idle,
-                1 => ForceAsked::InitialRamp,
-                2 => ForceAsked::LoadProfile,
-                3 => ForceAsked::Done,
-                4 => ForceAsked::Manual,
-                5 => ForceAsked::Relieve,
-                _ => play.inputs.asked,
+        let mut bench = ChainBench::new(ForceRequest::Relieve);
+        for (cycles, request, force_n, velocity_m_per_s) in row {
+            bench.inputs.cycle += cycles;
+            bench.inputs.force_n = force_n;
+            bench.inputs.velocity_m_per_s = velocity_m_per_s;
+            bench.inputs.request = match request {
+                0 => ForceRequest::Idle,
+                1 => ForceRequest::InitialRamp,
+                2 => ForceRequest::LoadProfile,
+                3 => ForceRequest::Done,
+                4 => ForceRequest::Manual,
+                5 => ForceRequest::Relieve,
+                _ => bench.inputs.request,
             };
-            let before = play.chain.entered.state;
-            let output = play.step();
+            let before = bench.chain.entered.state;
+            let output = bench.step();
             prop_assert!(!(output.feed_forward && output.dead_zone));
             prop_assert_eq!(output.limit_m_per_s.is_some(), output.state == S::Limited);
             prop_assert_eq!(output.fault.is_some(), output.state == S::Fault);
@@ -266,9 +266,9 @@ proptest! {
                 S::Moving => &[S::Standstill, S::Fault],
                 _ => &[],
             };
-            let cause = play.chain.entered.cause;
+            let cause = bench.chain.entered.cause;
             let same = output.state == before;
-            let allowed = same || by_itself.contains(&output.state) || matches!(cause, ForceCause::Asked(_));
+            let allowed = same || by_itself.contains(&output.state) || matches!(cause, ForceCause::Requested(_));
             prop_assert!(allowed, "{before} -> {}", output.state);
         }
     }

@@ -1,4 +1,4 @@
-//! What the main chain is given once: lengths, repetitions, and how it begins and goes on.
+//! Configuration of the main chain: lengths, repetitions, start, and behaviour after an emergency stop.
 
 use super::{APPROACH_M_PER_S, APPROACH_SHORTEST_S};
 use crate::chains::AfterStop;
@@ -17,7 +17,7 @@ pub struct Lengths {
     pub experiment_s: f64,
 }
 
-/// What ends the settling before the experiment, besides being settled.
+/// Condition that ends the settling before the experiment, besides being settled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Start {

@@ -1,7 +1,9 @@
 //! Which edge of the main chain is to be gone: pure functions of state and inputs.
 
 use super::config::PARTNER_TIMEOUT_S;
-use super::{Edge, Ended, GRACE_CYCLES, MainCause, MainChain, MainConfig, MainInputs, Start, State, Wait};
+use super::{
+    Edge, GRACE_CYCLES, MainCause, MainChain, MainConfig, MainInputs, RestartConditions, Start, State, Wait,
+};
 use crate::chains::sync::{Relation, relation};
 use crate::chains::{AfterStop, Fault, cycles};
 use protocol::frames::{ChainStatus, EmergencyStopChainState, MainChainState};
@@ -9,9 +11,9 @@ use protocol::frames::{ChainStatus, EmergencyStopChainState, MainChainState};
 impl MainChain {
     pub(super) fn decide(&self, inputs: &MainInputs) -> Option<Edge> {
         match &self.state {
-            State::Fault { ended, .. } => self.decide_ended(ended, inputs),
+            State::Fault { restart, .. } => self.decide_restart(restart, inputs),
             _ if inputs.fault.is_some() => inputs.fault.map(fault),
-            State::Aborted { ended } => self.decide_ended(ended, inputs),
+            State::Aborted { restart } => self.decide_restart(restart, inputs),
             _ if inputs.emergency_stop != EmergencyStopChainState::Ready => {
                 Some((MainChainState::Aborted, MainCause::EmergencyStop))
             }
@@ -109,7 +111,7 @@ impl MainChain {
         late.then_some(fault(cause))
     }
 
-    fn decide_ended(&self, ended: &Ended, inputs: &MainInputs) -> Option<Edge> {
+    fn decide_restart(&self, restart: &RestartConditions, inputs: &MainInputs) -> Option<Edge> {
         let ready = |state| state == EmergencyStopChainState::Ready;
         if self.config.after_emergency_stop == AfterStop::End || !ready(inputs.emergency_stop) {
             return None;
@@ -122,7 +124,7 @@ impl MainChain {
                 goes_along && ready(status.emergency_stop_chain)
             })?;
         }
-        let recovered = ended.stopped && !ended.by_person;
+        let recovered = restart.stopped && !restart.by_person;
         let cause = match inputs.console.start {
             true if !recovered => MainCause::Started,
             _ if recovered => MainCause::Recovered,
@@ -146,7 +148,7 @@ impl MainChain {
             S::Preparing => inputs.prepared || !config.prepares,
             S::InitialForce => over(config.lengths.initial_force_s),
             S::Settling | S::FinalSettling => {
-                self.settled.settled_for(config.settling_s, since, inputs.cycle)
+                self.settling.settled_for(config.settling_s, since, inputs.cycle)
             }
             S::Experiment => over(config.lengths.experiment_s),
             S::Done => true,
@@ -184,7 +186,7 @@ fn fault(fault: Fault) -> Edge {
     (MainChainState::Fault, MainCause::Fault(fault))
 }
 
-/// What follows from a partner in `state`, when it has ended its run.
+/// The edge to take when the partner, in `state`, has ended its run.
 fn partner_ended(state: MainChainState) -> Option<Edge> {
     let cause = match state {
         MainChainState::Aborted => MainCause::PartnerAborted,

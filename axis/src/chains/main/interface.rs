@@ -1,11 +1,11 @@
-//! What the main chain is given each cycle, what it says, and why it entered a state.
+//! Inputs and outputs of the main chain in a cycle, and the causes of its transitions.
 
 use crate::chains::settled::ControlError;
 use crate::chains::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopChainState, MainChainState};
 use std::fmt;
 
-/// What the axis measures of itself.
+/// Measurement of the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisMeasurement {
     /// Position sensor as it came, less the matched offset, rig coordinates, m.

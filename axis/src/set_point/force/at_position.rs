@@ -7,7 +7,7 @@
 //! An axis that begins beyond the position has not passed it. Once stepped it stays, however often the axis comes back.
 
 use crate::set_point::Actual;
-use crate::set_point::law::{Given, Moment};
+use crate::set_point::law::{ProfilePoint, SegmentReader};
 use crate::set_point::step::JUMP_S;
 use settings::SettingsError;
 use settings::parameters::Parameter;
@@ -34,7 +34,7 @@ pub(in crate::set_point) struct AtPosition {
     direction: Direction,
 }
 
-/// What has been seen of the axis since the segment began.
+/// Position of the axis and its crossing of the threshold since the segment began.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Crossing {
     last_m: Option<f64>,
@@ -43,27 +43,31 @@ pub(super) struct Crossing {
 }
 
 impl AtPosition {
-    pub(in crate::set_point) fn read(given: &mut Given<'_, '_>) -> Result<Self, SettingsError> {
-        let to_n = given.place("to", "force after the step")?;
-        let position =
-            Parameter::new((KEY, "m"), [0.0, given.scale.stroke_m], 0.0, "position at which the force steps");
-        let at_position_m = given.number(&position)?;
-        let direction = given.section.choice("direction", &DIRECTIONS)?;
-        let duration_s = given.duration_s(0.001)?;
-        Ok(Self { from_n: given.from, to_n, duration_s, at_position_m, direction })
+    pub(in crate::set_point) fn read(reader: &mut SegmentReader<'_, '_>) -> Result<Self, SettingsError> {
+        let to_n = reader.value("to", "force after the step")?;
+        let position = Parameter::new(
+            (KEY, "m"),
+            [0.0, reader.scale.stroke_m],
+            0.0,
+            "position at which the force steps",
+        );
+        let at_position_m = reader.number(&position)?;
+        let direction = reader.section.choice("direction", &DIRECTIONS)?;
+        let duration_s = reader.duration_s(0.001)?;
+        Ok(Self { from_n: reader.from, to_n, duration_s, at_position_m, direction })
     }
 
-    pub(super) fn at(&self, since_s: f64, crossing: &mut Crossing, actual: &Actual) -> Moment {
+    pub(super) fn at(&self, since_s: f64, crossing: &mut Crossing, actual: &Actual) -> ProfilePoint {
         let now_m = actual.position_m;
         let last_m = crossing.last_m.replace(now_m).unwrap_or(now_m);
         if crossing.passed_s.is_none() && self.passes(last_m, now_m) {
             crossing.passed_s = Some(since_s);
         }
         match crossing.passed_s {
-            None => Moment::at_rest(self.from_n),
+            None => ProfilePoint::at_rest(self.from_n),
             Some(passed_s) => {
                 let moving = since_s - passed_s < JUMP_S && self.to_n != self.from_n;
-                Moment { moving, ..Moment::at_rest(self.to_n) }
+                ProfilePoint { moving, ..ProfilePoint::at_rest(self.to_n) }
             }
         }
     }

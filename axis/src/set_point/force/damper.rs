@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub const KIND: Kind = Kind {
     name: "damper",
     about: "opposes the velocity in proportion",
-    read: |given| Ok(Arc::new(Damper { damping_n_s_per_m: given.number(&DAMPING)? })),
+    read: |reader| Ok(Arc::new(Damper { damping_n_s_per_m: reader.number(&DAMPING)? })),
 };
 
 static DAMPING: Parameter =

@@ -16,9 +16,9 @@ use std::sync::Arc;
 pub const KIND: Kind = Kind {
     name: "dry-friction",
     about: "a force of one size against the motion",
-    read: |given| {
-        let force_n = given.place("force", "size of the friction")?;
-        let velocity_scale_m_per_s = given.section.number_or_default(&VELOCITY_SCALE)?;
+    read: |reader| {
+        let force_n = reader.value("force", "size of the friction")?;
+        let velocity_scale_m_per_s = reader.section.number_or_default(&VELOCITY_SCALE)?;
         Ok(Arc::new(DryFriction { force_n, velocity_scale_m_per_s }))
     },
 };

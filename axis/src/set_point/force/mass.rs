@@ -15,7 +15,7 @@ use std::sync::Arc;
 pub const KIND: Kind = Kind {
     name: "mass",
     about: "opposes the acceleration in proportion",
-    read: |given| Ok(Arc::new(Mass { mass_kg: given.number(&MASS)? })),
+    read: |reader| Ok(Arc::new(Mass { mass_kg: reader.number(&MASS)? })),
 };
 
 static MASS: Parameter = Parameter::new(("mass_kg", "kg"), [0.0, 200.0], 10.0, "force for each acceleration");

@@ -15,16 +15,16 @@ use std::sync::Arc;
 pub const KIND: Kind = Kind {
     name: "spring",
     about: "grows with the way from a position of rest",
-    read: |given| {
-        let stroke_m = given.scale.stroke_m;
+    read: |reader| {
+        let stroke_m = reader.scale.stroke_m;
         let rest = Parameter::new(
             ("rest_position_m", "m"),
             [0.0, stroke_m],
             0.0,
             "position at which only the base force acts",
         );
-        let stiffness_n_per_m = given.number(&STIFFNESS)?;
-        Ok(Arc::new(Spring { stiffness_n_per_m, rest_position_m: given.number(&rest)? }))
+        let stiffness_n_per_m = reader.number(&STIFFNESS)?;
+        Ok(Arc::new(Spring { stiffness_n_per_m, rest_position_m: reader.number(&rest)? }))
     },
 };
 

@@ -55,7 +55,7 @@ impl Bench {
         CycleTiming { cycle, due_ns, woke_ns, receive_ns, step_ns, done_ns, ..CycleTiming::default() }
     }
 
-    fn tell(&self, row: CycleTiming) {
+    fn send(&self, row: CycleTiming) {
         self.measured.send(TimingSample::Cycle(row)).unwrap();
     }
 
@@ -72,7 +72,7 @@ impl Bench {
 fn each_row_and_each_wait_is_a_sample() {
     let mut bench = Bench::new(true);
     let rows = [bench.row(7, 20_000, 50_000), bench.row(8, 30_000, 100_000)];
-    rows.iter().for_each(|row| bench.tell(*row));
+    rows.iter().for_each(|row| bench.send(*row));
     // Nobody answers after these.
     bench.measured.send(TimingSample::Waited { arrived_ns: 1000, woke_ns: 91_000 }).unwrap();
     bench.queues.finish().unwrap();
@@ -102,7 +102,7 @@ fn sensors_that_were_overtaken_are_answered_when_the_row_after_them_is_done() {
         let arrived_ns = row.due_ns - n * MS;
         bench.measured.send(TimingSample::Waited { arrived_ns, woke_ns: row.woke_ns }).unwrap();
     }
-    bench.tell(row);
+    bench.send(row);
     bench.queues.finish().unwrap();
     let TimingFigures { stages, .. } = bench.queues.recorder.figures();
     assert_eq!((stages.wakeup_ns.count, stages.completion_ns.count), (50, 50));
@@ -114,7 +114,7 @@ fn sensors_that_were_overtaken_are_answered_when_the_row_after_them_is_done() {
 #[test]
 fn without_full_timing_there_is_no_table() {
     let mut bench = Bench::new(false);
-    bench.tell(bench.row(7, 20_000, 50_000));
+    bench.send(bench.row(7, 20_000, 50_000));
     bench.queues.finish().unwrap();
     assert!(!bench.run.path().join("controller-timing.csv").exists());
 }
@@ -123,17 +123,17 @@ fn without_full_timing_there_is_no_table() {
 fn late_slow_overtaken_and_faulty_freeze_the_recorder_and_the_rest_does_not() {
     let reported = |of: &dyn Fn(&mut Bench)| {
         let mut bench = Bench::new(false);
-        bench.tell(bench.row(6, 20_000, 50_000));
+        bench.send(bench.row(6, 20_000, 50_000));
         of(&mut bench);
         bench.queues.finish().unwrap();
         bench.dumps()
     };
-    assert_eq!(reported(&|bench| bench.tell(bench.row(7, 500_000, 500_000))), [""; 0]);
-    assert_eq!(reported(&|bench| bench.tell(bench.row(7, 500_001, 0))), ["controller-0000000007-late"]);
-    assert_eq!(reported(&|bench| bench.tell(bench.row(7, 0, 500_001))), ["controller-0000000007-slow"]);
+    assert_eq!(reported(&|bench| bench.send(bench.row(7, 500_000, 500_000))), [""; 0]);
+    assert_eq!(reported(&|bench| bench.send(bench.row(7, 500_001, 0))), ["controller-0000000007-late"]);
+    assert_eq!(reported(&|bench| bench.send(bench.row(7, 0, 500_001))), ["controller-0000000007-slow"]);
     let overrun = |bench: &mut Bench| {
         bench.measured.send(TimingSample::Waited { arrived_ns: 0, woke_ns: 3 * MS }).unwrap();
-        bench.tell(CycleTiming { skipped: 2, ..bench.row(9, 0, 0) });
+        bench.send(CycleTiming { skipped: 2, ..bench.row(9, 0, 0) });
     };
     assert_eq!(reported(&overrun), ["controller-0000000009-overrun"]);
     assert_eq!(reported(&|bench| bench.queues.fault(7)), ["controller-0000000007-fault"]);
@@ -150,9 +150,9 @@ fn a_dump_holds_the_rows_and_the_frames_both_ways_and_how_long_the_oldest_sensor
             bench.frames.send(StampedFrame { stamp_ns, frame, sent }).unwrap();
         }
     }
-    bench.tell(bench.row(6, 0, 0));
+    bench.send(bench.row(6, 0, 0));
     bench.measured.send(TimingSample::Waited { arrived_ns: MS, woke_ns: 4 * MS }).unwrap();
-    bench.tell(CycleTiming { skipped: 2, ..bench.row(9, 1000, 2000) });
+    bench.send(CycleTiming { skipped: 2, ..bench.row(9, 1000, 2000) });
     bench.queues.finish().unwrap();
     let dump = bench.run.path().join("flight/controller-0000000009-overrun");
     let read = |name: &str| fs::read_to_string(dump.join(name)).unwrap();
@@ -210,7 +210,7 @@ fn vitals_count_after_the_first_second() {
     let mut bench = Bench::new(false);
     let vitals = VitalCounts { minor_faults: 1, continued: 2, ..VitalCounts::default() };
     for cycle in [1, 500, 1001, 1002, 2000] {
-        bench.tell(CycleTiming { vitals, ..bench.row(cycle, 0, 0) });
+        bench.send(CycleTiming { vitals, ..bench.row(cycle, 0, 0) });
     }
     bench.queues.poll().unwrap();
     let counted = bench.queues.recorder.figures().vitals;
@@ -220,7 +220,7 @@ fn vitals_count_after_the_first_second() {
 #[test]
 fn a_new_run_begins_with_none_of_the_old_ones_dumps() {
     let mut bench = Bench::new(false);
-    bench.tell(bench.row(7, 600_000, 0));
+    bench.send(bench.row(7, 600_000, 0));
     bench.queues.finish().unwrap();
     assert_eq!(bench.dumps().len(), 1);
     flight_dump::clear(bench.run.path(), "controller").unwrap();

@@ -3,7 +3,7 @@
 use crate::sheet::{SEEDS, Spread};
 use plant::Axis;
 use plant::scene::{Arm, Hand, Part};
-use rehearsal::Rehearsed;
+use rehearsal::RehearsalRow;
 use std::error::Error;
 use tuning::cases::{Case, Made, figures};
 use tuning::rehearsed::{self, Run};
@@ -69,7 +69,7 @@ fn reported(case: &Case, seed: u64) -> Result<[Option<f64>; 8], TrialError> {
     // The last cycles are after the experiment, with the valve shut.
     let end = let_go + 3000;
     let tail = run.rows.get(end - 1000..end);
-    let open = |row: &&Rehearsed| row.cycle.valve[Axis::Load.index()] != 0.0;
+    let open = |row: &&RehearsalRow| row.cycle.valve[Axis::Load.index()] != 0.0;
     let open = tail.map(|tail| tail.iter().filter(open).count() as f64 / tail.len() as f64);
     let slides = position
         .get(let_go..let_go + 1000)
@@ -88,7 +88,7 @@ fn reported(case: &Case, seed: u64) -> Result<[Option<f64>; 8], TrialError> {
 }
 
 fn positions(run: &Run) -> Vec<f64> {
-    let position = |row: &Rehearsed| row.cycle.truth.axes[Axis::Load.index()].position_m;
+    let position = |row: &RehearsalRow| row.cycle.truth.axes[Axis::Load.index()].position_m;
     run.rows.iter().map(position).collect()
 }
 

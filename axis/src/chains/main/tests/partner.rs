@@ -3,11 +3,11 @@
 use super::*;
 
 /// Keeps an axis in a waiting state by taking what its condition needs.
-fn hold(duo: &mut Duo, index: usize, state: S) {
+fn hold(pair: &mut AxisPair, index: usize, state: S) {
     match state {
-        S::Preparing => duo.axes[index].prepared = false,
+        S::Preparing => pair.axes[index].prepared = false,
         S::Settling | S::FinalSettling => {
-            duo.axes[index].error = ControlError::Position { error_m: 0.1 };
+            pair.axes[index].error = ControlError::Position { error_m: 0.1 };
         }
         _ => {}
     }
@@ -16,110 +16,110 @@ fn hold(duo: &mut Duo, index: usize, state: S) {
 #[test]
 fn a_partner_that_falls_silent_is_lost_after_a_hundred_cycles() {
     for state in RUNNING {
-        let mut duo = both_in(state);
-        let silent_from = duo.cycle;
+        let mut pair = both_in(state);
+        let silent_from = pair.cycle;
         // Neither may go on in the meantime.
-        hold(&mut duo, 0, state);
-        duo.axes[1].alive = false;
-        while duo.axes[0].state() != S::Fault {
-            duo.step();
-            assert!(duo.cycle < silent_from + 1000, "{state}");
+        hold(&mut pair, 0, state);
+        pair.axes[1].alive = false;
+        while pair.axes[0].state() != S::Fault {
+            pair.step();
+            assert!(pair.cycle < silent_from + 1000, "{state}");
         }
-        assert_eq!(duo.faults()[0], Some(Fault::PartnerLost), "{state}");
-        let cycles = duo.cycle - silent_from;
+        assert_eq!(pair.faults()[0], Some(Fault::PartnerLost), "{state}");
+        let cycles = pair.cycle - silent_from;
         assert!((100..=104).contains(&cycles), "{state}: {cycles}");
-        duo.run(300);
-        assert_eq!(duo.axes[0].stop_state(), EmergencyStopChainState::WaitingForRelease);
+        pair.run(300);
+        assert_eq!(pair.axes[0].stop_state(), EmergencyStopChainState::WaitingForRelease);
     }
 }
 
 #[test]
 fn a_lost_partner_cannot_be_released_before_it_is_heard() {
-    let mut duo = both_in(S::Experiment);
-    duo.axes[1].received = false;
-    duo.run(500);
-    assert_eq!(duo.faults(), [Some(Fault::PartnerLost), None]);
-    duo.console.release = true;
-    duo.run(1000);
-    assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::PartnerLost));
-    duo.axes[1].received = true;
-    duo.run(1000);
-    assert_eq!(duo.axes[0].leading.stop.holds(), Some(Fault::PartnerLost), "the release came too early");
-    duo.console.release = true;
-    duo.run(400);
-    assert_eq!(duo.states(), [S::InitialPositioning; 2]);
+    let mut pair = both_in(S::Experiment);
+    pair.axes[1].received = false;
+    pair.run(500);
+    assert_eq!(pair.faults(), [Some(Fault::PartnerLost), None]);
+    pair.console.release = true;
+    pair.run(1000);
+    assert_eq!(pair.axes[0].supervisory.stop.holds(), Some(Fault::PartnerLost));
+    pair.axes[1].received = true;
+    pair.run(1000);
+    assert_eq!(pair.axes[0].supervisory.stop.holds(), Some(Fault::PartnerLost), "the release came too early");
+    pair.console.release = true;
+    pair.run(400);
+    assert_eq!(pair.states(), [S::InitialPositioning; 2]);
 }
 
 #[test]
 fn status_frames_may_be_lost_for_a_while() {
-    let mut duo = Duo::new(&short());
+    let mut pair = AxisPair::new(&short());
     for round in 0..60 {
-        duo.axes[round % 2].received = false;
-        duo.run(90);
-        duo.axes[round % 2].received = true;
-        duo.run(10);
+        pair.axes[round % 2].received = false;
+        pair.run(90);
+        pair.axes[round % 2].received = true;
+        pair.run(10);
     }
-    assert_eq!((duo.states(), duo.faults()), ([S::Done; 2], [None; 2]));
+    assert_eq!((pair.states(), pair.faults()), ([S::Done; 2], [None; 2]));
 }
 
 #[test]
 fn a_partner_may_be_silent_when_done() {
-    let mut duo = both_in(S::Done);
-    duo.axes[1].alive = false;
-    duo.run(1000);
-    assert_eq!(duo.axes[0].state(), S::Done);
+    let mut pair = both_in(S::Done);
+    pair.axes[1].alive = false;
+    pair.run(1000);
+    assert_eq!(pair.axes[0].state(), S::Done);
 }
 
 #[test]
 fn a_partner_that_is_never_heard_is_missing_after_ten_seconds() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1].alive = false;
-    duo.run(10_001);
-    assert_eq!(duo.axes[0].state(), S::WaitingForRig);
-    duo.step();
-    assert_eq!(duo.faults()[0], Some(Fault::PartnerMissing));
+    let mut pair = AxisPair::new(&short());
+    pair.axes[1].alive = false;
+    pair.run(10_001);
+    assert_eq!(pair.axes[0].state(), S::WaitingForRig);
+    pair.step();
+    assert_eq!(pair.faults()[0], Some(Fault::PartnerMissing));
 }
 
 #[test]
 fn a_partner_without_sensors_is_not_ok() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1].sensors = false;
-    duo.run(10_002);
-    assert_eq!(duo.faults()[0], Some(Fault::PartnerNotOk));
+    let mut pair = AxisPair::new(&short());
+    pair.axes[1].sensors = false;
+    pair.run(10_002);
+    assert_eq!(pair.faults()[0], Some(Fault::PartnerNotOk));
 }
 
 #[test]
 fn a_partner_with_another_experiment_is_named_so() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1] = One::new(MainConfig { experiment: 8, ..short() });
-    duo.run(10_002);
-    assert_eq!(duo.faults()[0], Some(Fault::PartnerOtherExperiment));
+    let mut pair = AxisPair::new(&short());
+    pair.axes[1] = SimulatedAxis::new(MainConfig { experiment: 8, ..short() });
+    pair.run(10_002);
+    assert_eq!(pair.faults()[0], Some(Fault::PartnerOtherExperiment));
 }
 
 #[test]
 fn a_partner_that_comes_late_is_waited_for() {
-    let mut duo = Duo::new(&short());
-    duo.axes[1].alive = false;
-    duo.run(9000);
-    duo.axes[1].alive = true;
-    duo.run(5000);
-    assert_eq!(duo.states(), [S::Done; 2]);
+    let mut pair = AxisPair::new(&short());
+    pair.axes[1].alive = false;
+    pair.run(9000);
+    pair.axes[1].alive = true;
+    pair.run(5000);
+    assert_eq!(pair.states(), [S::Done; 2]);
 }
 
 #[test]
 fn a_partner_that_begins_anew_is_a_fault() {
     for state in RUNNING {
-        let mut duo = both_in(state);
-        hold(&mut duo, 0, state);
-        duo.axes[1] = One::new(short());
-        duo.run(4);
+        let mut pair = both_in(state);
+        hold(&mut pair, 0, state);
+        pair.axes[1] = SimulatedAxis::new(short());
+        pair.run(4);
         if state == S::InitialPositioning {
-            assert_eq!(duo.states(), [state; 2], "it just began: the other joins");
+            assert_eq!(pair.states(), [state; 2], "it just began: the other joins");
             continue;
         }
-        assert_eq!(duo.faults()[0], Some(Fault::PartnerRestarted), "{state}");
-        duo.run(100);
-        assert_eq!(duo.states(), [S::Fault, S::Aborted], "{state}");
+        assert_eq!(pair.faults()[0], Some(Fault::PartnerRestarted), "{state}");
+        pair.run(100);
+        assert_eq!(pair.states(), [S::Fault, S::Aborted], "{state}");
     }
 }
 
@@ -130,22 +130,22 @@ fn an_axis_that_does_not_settle_ends_in_a_fault_of_that_name() {
         (S::Settling, Fault::SettlingTimeout),
         (S::FinalSettling, Fault::SettlingTimeout),
     ] {
-        let mut duo = Duo::new(&short());
-        duo.axes[1].prepared = true;
+        let mut pair = AxisPair::new(&short());
+        pair.axes[1].prepared = true;
         if state == S::FinalSettling {
-            duo.run_to(S::Experiment);
+            pair.run_to(S::Experiment);
         }
-        hold(&mut duo, 0, state);
-        duo.run_to(state);
-        let since = duo.cycle;
-        duo.run_to(S::Fault);
-        assert_eq!(duo.faults()[0], Some(fault));
+        hold(&mut pair, 0, state);
+        pair.run_to(state);
+        let since = pair.cycle;
+        pair.run_to(S::Fault);
+        assert_eq!(pair.faults()[0], Some(fault));
         // 2 s beyond the 0.3 s that settling takes.
         let expected = if state == S::Preparing { 2000 } else { 2300 };
-        let cycles = duo.cycle - since;
+        let cycles = pair.cycle - since;
         assert!(cycles.abs_diff(expected) <= 2, "{state}: {cycles}");
-        duo.run(3);
-        assert_eq!(duo.states()[1], S::Aborted);
+        pair.run(3);
+        assert_eq!(pair.states()[1], S::Aborted);
     }
 }
 
@@ -169,19 +169,19 @@ fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
         _ => MainConfig { settling_timeout_s: endless, ..short() },
     };
     for state in RUNNING {
-        let mut duo = Duo::new(&short());
-        duo.axes[1] = One::new(slow(state));
-        duo.axes[1].prepared = state != S::Preparing;
+        let mut pair = AxisPair::new(&short());
+        pair.axes[1] = SimulatedAxis::new(slow(state));
+        pair.axes[1].prepared = state != S::Preparing;
         if state == S::FinalSettling {
-            duo.run_to(S::Experiment);
+            pair.run_to(S::Experiment);
         }
         if matches!(state, S::Settling | S::FinalSettling) {
-            hold(&mut duo, 1, state);
+            hold(&mut pair, 1, state);
         }
-        duo.run_to(state);
-        let since = duo.cycle;
-        duo.run_to(S::Fault);
-        assert_eq!(duo.faults()[0], Some(Fault::PartnerNotOk), "{state}");
+        pair.run_to(state);
+        let since = pair.cycle;
+        pair.run_to(S::Fault);
+        assert_eq!(pair.faults()[0], Some(Fault::PartnerNotOk), "{state}");
         let own_s = match state {
             S::InitialPositioning => short().approach_longest_s,
             S::Preparing => 0.0,
@@ -189,7 +189,7 @@ fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
             S::Experiment => 1.0,
             _ => 0.3,
         };
-        let cycles = (duo.cycle - since) as f64 * 1e-3;
+        let cycles = (pair.cycle - since) as f64 * 1e-3;
         assert!((cycles - own_s - 2.1).abs() < 0.01, "{state}: {cycles} s");
     }
 }
@@ -197,70 +197,70 @@ fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
 #[test]
 fn a_slow_partner_is_waited_for_when_its_length_is_known() {
     let long = Lengths { experiment_s: 6.0, ..short().lengths };
-    let mut duo = Duo::new(&MainConfig { longest_lengths: long, ..short() });
-    duo.axes[1] = One::new(MainConfig { lengths: long, longest_lengths: long, ..short() });
-    duo.run(9000);
-    assert_eq!(duo.states(), [S::Done; 2]);
+    let mut pair = AxisPair::new(&MainConfig { longest_lengths: long, ..short() });
+    pair.axes[1] = SimulatedAxis::new(MainConfig { lengths: long, longest_lengths: long, ..short() });
+    pair.run(9000);
+    assert_eq!(pair.states(), [S::Done; 2]);
 }
 
 #[test]
 fn two_axes_that_hunt_each_other_do_not_wait_for_ever() {
-    let mut duo = Duo::new(&short());
-    duo.run_to(S::Settling);
+    let mut pair = AxisPair::new(&short());
+    pair.run_to(S::Settling);
     for round in 0..10 {
         // Each is settled for a moment while the other is not.
         for index in [0, 1] {
             let error_m = if round % 2 == index { 0.1 } else { 0.0 };
-            duo.axes[index].error = ControlError::Position { error_m };
+            pair.axes[index].error = ControlError::Position { error_m };
         }
-        duo.run(550);
+        pair.run(550);
     }
-    assert!(duo.states().contains(&S::Fault), "{:?}", duo.states());
+    assert!(pair.states().contains(&S::Fault), "{:?}", pair.states());
 }
 
 /// An aborted pair on the way back, whose second axis is held up for `cycles` by its sensors.
-fn recovering_apart(cycles: u64) -> Duo {
-    let mut duo = both_in(S::Experiment);
-    duo.stop_and_release();
-    duo.axes[1].sensors = false;
-    duo.run_to(S::InitialPositioning);
-    duo.run(cycles);
-    assert_eq!(duo.states()[1], S::Aborted);
-    duo.axes[1].sensors = true;
-    duo
+fn recovering_apart(cycles: u64) -> AxisPair {
+    let mut pair = both_in(S::Experiment);
+    pair.stop_and_release();
+    pair.axes[1].sensors = false;
+    pair.run_to(S::InitialPositioning);
+    pair.run(cycles);
+    assert_eq!(pair.states()[1], S::Aborted);
+    pair.axes[1].sensors = true;
+    pair
 }
 
 #[test]
 fn a_partner_that_is_a_little_later_on_the_way_back_is_waited_for() {
-    let mut duo = recovering_apart(90);
-    duo.run(6000);
-    assert_eq!(duo.states(), [S::Done; 2]);
+    let mut pair = recovering_apart(90);
+    pair.run(6000);
+    assert_eq!(pair.states(), [S::Done; 2]);
 }
 
 #[test]
 fn a_partner_that_stays_aborted_on_the_way_back_ends_it_until_a_person_starts() {
-    let mut duo = recovering_apart(110);
-    assert_eq!(duo.states(), [S::Aborted; 2]);
-    assert_eq!(duo.axes[0].leading.main.entered.cause, MainCause::PartnerAborted);
+    let mut pair = recovering_apart(110);
+    assert_eq!(pair.states(), [S::Aborted; 2]);
+    assert_eq!(pair.axes[0].supervisory.main.entered.cause, MainCause::PartnerAborted);
     // The second still goes by itself, is left alone, and gives up too.
-    duo.run(1000);
-    assert_eq!(duo.states(), [S::Aborted; 2]);
-    duo.console.start = true;
-    duo.run(6000);
-    assert_eq!(duo.states(), [S::Done; 2]);
+    pair.run(1000);
+    assert_eq!(pair.states(), [S::Aborted; 2]);
+    pair.console.start = true;
+    pair.run(6000);
+    assert_eq!(pair.states(), [S::Done; 2]);
 }
 
 #[test]
 fn both_go_on_with_the_later_repetition() {
-    let mut duo = Duo::new(&MainConfig { repetitions: Some(9), ..short() });
-    duo.run_to(S::Experiment);
-    duo.stop_and_release();
+    let mut pair = AxisPair::new(&MainConfig { repetitions: Some(9), ..short() });
+    pair.run_to(S::Experiment);
+    pair.stop_and_release();
     for (index, repetition) in [(0, 6), (1, 7)] {
-        duo.axes[index].leading.main.repetition = repetition;
+        pair.axes[index].supervisory.main.repetition = repetition;
     }
-    duo.run(300);
-    assert_eq!(duo.states(), [S::InitialPositioning; 2]);
-    assert_eq!([0, 1].map(|index| duo.axes[index].output.unwrap().repetition), [7; 2]);
+    pair.run(300);
+    assert_eq!(pair.states(), [S::InitialPositioning; 2]);
+    assert_eq!([0, 1].map(|index| pair.axes[index].output.unwrap().repetition), [7; 2]);
 }
 
 #[test]
@@ -273,11 +273,11 @@ fn nobody_goes_back_before_the_partner_has_ended_and_its_emergency_stop_chain_is
         (S::Aborted, Stop::Ready, S::InitialPositioning),
         (S::Fault, Stop::Ready, S::InitialPositioning),
     ] {
-        let mut duo = both_in(S::Experiment);
-        duo.console_holds = true;
-        duo.step();
+        let mut pair = both_in(S::Experiment);
+        pair.console_holds = true;
+        pair.step();
         let status = ChainStatus { main_chain, emergency_stop_chain, ..ChainStatus::default() };
-        let output = duo.axes[0].leading.main.advance(&reported(duo.cycle, status));
+        let output = pair.axes[0].supervisory.main.advance(&reported(pair.cycle, status));
         assert_eq!(output.state, state, "{main_chain} {emergency_stop_chain}");
     }
 }

@@ -7,22 +7,22 @@ use std::path::PathBuf;
 use std::process::ExitStatus;
 use std::time::Duration;
 
-/// A library that is not taken.
+/// A library that is refused.
 #[derive(Debug, thiserror::Error)]
-#[error("library '{}': {wrong}", library.display())]
+#[error("library '{}': {reason}", library.display())]
 pub struct PluginError {
-    /// Its file.
+    /// File of the library.
     pub library: PathBuf,
-    /// What is wrong with it.
-    pub wrong: Wrong,
+    /// Why it is refused.
+    pub reason: RefusalReason,
 }
 
 const REBUILD: &str = "build it again with this airbench's airbench_algorithm.h";
 
-/// What is wrong with a library, or with its trial.
+/// Reason for which a library, or its trial, is refused.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs)] // the message of each says what it is
-pub enum Wrong {
+pub enum RefusalReason {
     #[error("cannot be opened: {0}; give the path of a shared library")]
     File(#[source] io::Error),
     #[error("the system does not load it: {0}; build a shared library, with -fPIC -shared")]
@@ -35,11 +35,11 @@ pub enum Wrong {
         "airbench_algorithm_entry({INTERFACE_VERSION}) returned NULL: it does not speak version {INTERFACE_VERSION} \
          of the interface; {REBUILD}"
     )]
-    NothingOffered,
+    NoDescriptor,
     #[error(
         "its {0} stands at an address that no such structure can have; return the address of a static structure"
     )]
-    Misplaced(&'static str),
+    BadAddress(&'static str),
     #[error("it speaks version {0} of the interface, this airbench version {INTERFACE_VERSION}; {REBUILD}")]
     Version(u32),
     #[error(
@@ -56,7 +56,7 @@ pub enum Wrong {
     #[error("it has {0} parameters; at most {MOST_PARAMETERS} are allowed")]
     TooMany(u32),
     #[error("it has two parameters '{0}'; give each a name of its own")]
-    Twice(String),
+    DuplicateParameter(String),
     #[error(
         "parameter '{name}' has the range {least} to {most}; both must be finite, the first below the second"
     )]
@@ -88,16 +88,16 @@ pub enum Wrong {
     )]
     Hung { limit: Duration, during: String },
     #[error("{0}")]
-    Told(String),
+    Reported(String),
     #[error("no controller program was found to try it, at {0}; build it with cargo build -p controller")]
     NoTrialRunner(String),
     #[error("'{}' cannot try libraries; build it with cargo build -p controller", .0.display())]
-    ForeignTrier(PathBuf),
+    NotATrialRunner(PathBuf),
     #[error("the process that tries it cannot be started: {0}")]
     NoChild(#[source] io::Error),
 }
 
-impl Wrong {
+impl RefusalReason {
     pub(super) fn text(what: impl Into<String>, why: &'static str) -> Self {
         Self::Text { what: what.into(), why }
     }
