@@ -17,7 +17,7 @@ use crate::engine::Engine;
 use crate::folder::{self, Folder, FolderError};
 use crate::gridded_record::GriddedRecord;
 use crate::refit::Linearisation;
-use crate::report::{Misfit, Objection, Report, Verdict, Verification};
+use crate::report::{HeldOutFinding, Report, SignalMisfit, Verdict, Verification};
 use crate::suspects::{self, Suspect};
 use crate::workflow::{self, Outcome, RigFile, Task, WorkflowError, close, open};
 use crate::{locate, page, verify};
@@ -156,7 +156,8 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
 /// The exit code of a judged report. A verdict that the held-out record contradicts is a broken bound for who asked to be
 /// strict; one that it confirms, and that is not the whole, is none.
 fn exit_of(report: &Report, strict: bool) -> Exit {
-    let contradicted = report.objection().is_some_and(|objection| objection != Objection::MoreMissing);
+    let contradicted =
+        report.held_out_finding().is_some_and(|objection| objection != HeldOutFinding::MoreMissing);
     match report.verdict {
         Verdict::BadData => Exit::BadInput,
         _ if strict && contradicted => Exit::BoundBroken,
@@ -368,7 +369,7 @@ fn verify_command(arguments: &VerifyArguments) -> Result<Exit, CommandError> {
 #[derive(serde::Serialize)]
 struct VerifiedFile<'a> {
     #[serde(rename = "gap")]
-    misfit: &'a BTreeMap<String, Misfit>,
+    misfit: &'a BTreeMap<String, SignalMisfit>,
     verification: &'a Verification,
 }
 

@@ -217,7 +217,7 @@ pub fn name(
         };
         fitted.significance(model)
     });
-    if let Some(objection) = significance.as_ref().and_then(Significance::objection) {
+    if let Some(objection) = significance.as_ref().and_then(Significance::rejection_reason) {
         decision = decision.without_names(here, objection);
     }
     let Decision { selection, lacks_fit, shares, is_named, explained } = decision;

@@ -39,7 +39,7 @@ pub mod refits;
 pub(crate) mod remedies;
 
 use crate::engine::Engine;
-use crate::report::{Next, SecondExperiment, listed};
+use crate::report::{NextExperiment, SecondExperiment, listed};
 use choice::{Probability, RehearsedEntry, WORTH_IT, rehearse, second};
 use closed_loop::{SEED, drive};
 use divergence::{Divergence, divergences};
@@ -80,8 +80,8 @@ pub struct ExperimentDivergences {
 /// The proposed experiment and its file, and the rehearsed menu.
 #[derive(Clone, Debug)]
 pub struct Proposal {
-    /// For the report; [`Next::experiment`] is the file's name.
-    pub next: Next,
+    /// For the report; [`NextExperiment::experiment`] is the file's name.
+    pub next: NextExperiment,
     /// Text of the experiment file, if one is proposed.
     pub(crate) experiment_toml: Option<String>,
     /// All entries of the menu that can be rehearsed, the best first.
@@ -158,7 +158,7 @@ pub fn judge(
 
 impl Proposal {
     fn without(reason: String, otherwise: Option<String>, rehearsed: Vec<RehearsedEntry>) -> Self {
-        let next = Next { reason, otherwise, ..Next::default() };
+        let next = NextExperiment { reason, otherwise, ..NextExperiment::default() };
         Proposal { next, experiment_toml: None, rehearsed }
     }
 }
@@ -185,13 +185,13 @@ fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
     let separated = probability_in_words(probability, best.trials.len());
     let divergence = judge(entry, question.baseline, explanations, question.axes_measured)
         .map(|judged| judged.least_in_repetitions(times));
-    let found = Next {
+    let found = NextExperiment {
         divergence,
         probability: Some(probability.value),
         probability_interval: Some([probability.low, probability.high]),
         rehearsals: Some(best.trials.len()),
         otherwise,
-        ..Next::default()
+        ..NextExperiment::default()
     };
     let how_often = if times > 1 { format!(" in {times} repetitions") } else { String::new() };
     if probability.value < WORTH_IT {
@@ -199,7 +199,7 @@ fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
             "{alike}, and no experiment of this rig separates them: the best, {}, is expected to{how_often} {separated}",
             best.name
         );
-        let next = Next { reason, ..found };
+        let next = NextExperiment { reason, ..found };
         return Proposal { next, experiment_toml: None, rehearsed };
     }
     let rest = if left.is_empty() { "" } else { "; it does not separate all of them" };
@@ -212,7 +212,7 @@ fn choose(question: Question<'_>, rehearsed: Vec<RehearsedEntry>) -> Proposal {
         probability: both.value,
         probability_interval: [both.low, both.high],
     });
-    let next = Next { reason, experiment: Some(entry.file()), then, ..found };
+    let next = NextExperiment { reason, experiment: Some(entry.file()), then, ..found };
     Proposal { next, experiment_toml: Some(text(entry, times)), rehearsed }
 }
 

@@ -16,7 +16,7 @@ pub(crate) mod formula;
 
 use crate::locate::maps::{map, surface};
 use crate::locate::{MEMORY, TIME, UnknownSeries, VARIABLES};
-use crate::report::{Curve, Dependence, LocatedTerm, Outside};
+use crate::report::{Curve, Dependence, LocatedTerm, UncataloguedTerm};
 pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
 
@@ -55,7 +55,7 @@ pub fn outside(
     unknowns: &[UnknownSeries],
     located: Option<&LocatedTerm>,
     progress: &mut dyn FnMut(&str),
-) -> Option<Outside> {
+) -> Option<UncataloguedTerm> {
     let mut best: Option<(f64, BalanceTests<'_>)> = None;
     for series in unknowns.iter().filter(|series| series.points.len() >= MIN_WINDOWS) {
         progress(&format!("outside: {}", series.balance));
@@ -87,7 +87,7 @@ fn places(located: &LocatedTerm, order: &mut Vec<usize>) -> Vec<usize> {
 }
 
 impl BalanceTests<'_> {
-    fn report(&self, located: Option<&LocatedTerm>) -> Outside {
+    fn report(&self, located: Option<&LocatedTerm>) -> UncataloguedTerm {
         let (mut order, mut pair) = self.order();
         if let Some(located) = located {
             let first = places(located, &mut order);
@@ -118,13 +118,13 @@ impl BalanceTests<'_> {
         }
         let formula =
             if variables.is_empty() { None } else { formula::formula(&self.sample, self.series.unit) };
-        Outside {
+        UncataloguedTerm {
             balance: self.series.balance.clone(),
             curve: order.first().map(|first| smooth(map(self.series, *first), VARIABLES[*first].name)),
             surface: pair.map(|pair| surface(self.series, pair)),
             formula,
             variables,
-            ..Outside::default()
+            ..UncataloguedTerm::default()
         }
     }
 

@@ -5,8 +5,8 @@ use plant::effects::sheet::{Part, Place};
 pub use runlog::discrepancy_report::*;
 
 #[must_use]
-pub fn place_of(place: Place) -> Where {
-    let named = Where::named(&place.to_string());
+pub fn place_of(place: Place) -> RigPlace {
+    let named = RigPlace::named(&place.to_string());
     debug_assert!(place.element.is_some() == named.element.is_some() || matches!(place.part, Part::Linkage));
     named
 }

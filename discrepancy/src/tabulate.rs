@@ -24,7 +24,7 @@ use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
 use crate::name::{MIN_LOSS_REDUCTION, share_removed};
 use crate::parameters::{COUNT, with_factors};
 use crate::refit::Refit;
-use crate::report::{Outside, Quantity, TableTerm};
+use crate::report::{Quantity, TableTerm, UncataloguedTerm};
 use fit::{FittedTable, Iterate, LinearisedTable, Model, TableLinearisation};
 use plant::effects::tabulated::{self, Balance, Tabulated, Variable, interpolated};
 use plant::{Axis, RigParameters};
@@ -59,7 +59,7 @@ pub(crate) fn tabulate(
     engine: &Engine<'_>,
     calibrated: &Refit,
     reported: &Refit,
-    outside: &Outside,
+    outside: &UncataloguedTerm,
     unknowns: &[UnknownSeries],
     progress: &mut dyn FnMut(&str),
 ) -> Result<Tables, String> {

@@ -31,7 +31,7 @@ use crate::fit::LEAST;
 use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::name::lack_of_fit_per_dof;
 use crate::page::Trace;
-use crate::report::{BeforeAfter, Misfit, Verification};
+use crate::report::{BeforeAfter, SignalMisfit, Verification};
 use crate::windows::Windows;
 use model_fit::WORSE;
 use model_fit::stats::mean_and_variance;
@@ -53,7 +53,7 @@ const EXCESS_SPREADS: f64 = 10.0;
 #[derive(Clone, Debug)]
 pub(crate) struct Verified {
     /// The misfit of each signal, by its column.
-    pub(crate) misfit: BTreeMap<String, Misfit>,
+    pub(crate) misfit: BTreeMap<String, SignalMisfit>,
     /// Chi2, whiteness, free run, and whether the extended model is confirmed.
     pub(crate) verification: Verification,
     /// Series for the page.
@@ -162,13 +162,13 @@ fn column(axis: usize, at: usize) -> String {
 }
 
 /// Misfit of an output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
-fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> Misfit {
+fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> SignalMisfit {
     let [before, after] = models.each_ref().map(|power| power.output(output));
     let kept = kept(&models[0].smaller(&models[1]).output(output));
     let [before_power, after_power] = [&before, &after].map(|squares| pooled(squares, &kept));
     let excess = before_power - 1.0;
     let is_resolved = excess > EXCESS_SPREADS * spread;
-    Misfit {
+    SignalMisfit {
         before: noise * before_power.sqrt(),
         after: noise * after_power.sqrt(),
         floor: noise,

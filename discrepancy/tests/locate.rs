@@ -5,10 +5,10 @@ use discrepancy::discrepancy_term::{Beside, located_term};
 use discrepancy::engine::Engine;
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
-use discrepancy::report::Outside;
+use discrepancy::report::UncataloguedTerm;
 use plant::RigParameters;
 
-fn located(effects: &[Hidden<'_>]) -> (Located, Option<Outside>) {
+fn located(effects: &[Hidden<'_>]) -> (Located, Option<UncataloguedTerm>) {
     let rig = RigParameters::baseline();
     let records = [gridded(&hiding(effects), &rig)];
     let located = locate(&rig, &records, &mut |_| ());

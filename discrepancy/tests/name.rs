@@ -129,7 +129,7 @@ fn a_hidden_leak_is_named_with_its_place_and_its_amount() {
     assert!(found.shares[0] > 0.9, "{:?}", found.shares);
     let tests = found.significance.as_ref().expect("it was to be named");
     let chance = tests.chance.as_ref().expect("the rods are not linked");
-    assert!(tests.objection().is_none() && chance.draws == 5 && chance.p_value < 0.005, "{tests:?}");
+    assert!(tests.rejection_reason().is_none() && chance.draws == 5 && chance.p_value < 0.005, "{tests:?}");
     let explanation = &found.explanations[2];
     assert_eq!(explanation.sets[0][0].candidate.name(), "rod-leakage drive.b");
     assert_eq!(most_probable_by_marginal(&found), 2);

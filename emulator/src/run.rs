@@ -30,11 +30,11 @@ use realtime::{
     Clock, Continued, Freeze, Grants, Interrupt, Machine, MonotonicClock, PeriodicConfig, Request,
     allocations,
 };
-use runlog::flight_dump::{self, Log};
+use runlog::flight_dump::{self, FrameLogFormat};
 use runlog::process::Process;
 use runlog::run_folder::{RUN_JSON, SCHEMA_VERSION, clear_results, write_json};
 use runlog::summary::RunDescription;
-use runlog::timing_recorder::{Due, TimingSetup};
+use runlog::timing_recorder::{Activation, TimingSetup};
 use std::io;
 use std::path::Path;
 use std::sync::Arc;
@@ -323,10 +323,10 @@ fn open_folder(
         timing: started.unix_s.map(|started_unix_s| TimingSetup {
             folder: folder.into(),
             process: Process::Emulator,
-            due: Due::EveryPeriod,
+            activation: Activation::EveryPeriod,
             full_timing: arguments.full_timing,
             flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
-            log: Log { interface: interface.into(), epoch_offset_ns: started.epoch_offset_ns },
+            log: FrameLogFormat { interface: interface.into(), epoch_offset_ns: started.epoch_offset_ns },
             started_unix_s,
             started: started.monotonic,
             copies_lines: telemetry.is_some(),

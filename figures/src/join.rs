@@ -10,7 +10,7 @@
 
 use crate::families::{self, Figures, position};
 use crate::record::{self, Record};
-use crate::reports::{self, Reports};
+use crate::reports::{self, ControllerReports};
 use crate::{SummaryError, thresholds};
 use runlog::controller_report::{ControllerFigures, reported_of_axis};
 use runlog::run_folder::{FileError, RUN_JSON, SUMMARY_JSON, in_order, read_json, write_json};
@@ -76,16 +76,16 @@ pub fn join(folder: &Path) -> Result<Joined, SummaryError> {
 }
 
 /// The controllers' reports as far as they are there: one for both axes, or one each.
-fn add_controllers(summary: &mut JoinedSummary, run: &mut JoinedRun, reports: Reports) {
+fn add_controllers(summary: &mut JoinedSummary, run: &mut JoinedRun, reports: ControllerReports) {
     let axes = reports.axes();
     let mut by_controllers = ReportedByControllers::default();
     match reports {
-        Reports::None => return,
-        Reports::Both(reported) => {
+        ControllerReports::None => return,
+        ControllerReports::Both(reported) => {
             by_controllers.controller = Some(reported.figures);
             run.controller = Some(reported.used);
         }
-        Reports::Each(each) => {
+        ControllerReports::Each(each) => {
             let parted = each.into_iter().map(|(axis, own)| {
                 let named = |axis: &str| axis.to_owned();
                 ((named(axis), own.figures), (named(axis), own.used))

@@ -6,39 +6,39 @@
 
 use crate::SummaryError;
 use runlog::Axis;
-use runlog::controller_report::PartedReport;
+use runlog::controller_report::SplitControllerReport;
 use runlog::process::Process;
 use runlog::run_folder::read_json;
 use serde_json::{Map, Value};
 use std::path::Path;
 
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Reports {
+pub(crate) enum ControllerReports {
     /// No controller left one.
     None,
     /// One process for both axes.
-    Both(Box<PartedReport>),
+    Both(Box<SplitControllerReport>),
     /// A process for each axis, those that left one.
-    Each(Vec<(&'static str, PartedReport)>),
+    Each(Vec<(&'static str, SplitControllerReport)>),
 }
 
-pub(crate) fn read(folder: &Path) -> Result<Reports, SummaryError> {
+pub(crate) fn read(folder: &Path) -> Result<ControllerReports, SummaryError> {
     let read = |name: &str| {
         let path = folder.join(name);
         path.exists().then(|| read_json(&path)).transpose()
     };
     if let Some(both) = read(&Process::Controller.report())? {
-        return Ok(Reports::Both(Box::new(both)));
+        return Ok(ControllerReports::Both(Box::new(both)));
     }
     let mut each = Vec::new();
     for axis in Axis::ALL {
         let reported = read(&Process::ControllerOf(axis).report())?;
         each.extend(reported.map(|reported| (axis.name(), reported)));
     }
-    Ok(if each.is_empty() { Reports::None } else { Reports::Each(each) })
+    Ok(if each.is_empty() { ControllerReports::None } else { ControllerReports::Each(each) })
 }
 
-impl Reports {
+impl ControllerReports {
     /// What they say of each axis that they name.
     pub(crate) fn axes(&self) -> Map<String, Value> {
         match self {

@@ -122,7 +122,7 @@ pub struct IgnoredFrames {
 /// it.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(default)]
-pub struct PartedReport {
+pub struct SplitControllerReport {
     /// How it ended and kept its time.
     #[serde(flatten)]
     pub figures: ControllerFigures,

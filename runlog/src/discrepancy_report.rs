@@ -22,16 +22,16 @@ pub use declared::DeclaredSuspect;
 pub use explanation::{Explanation, ExplanationKind, Features, Marginal};
 pub use fit::{Convergence, Outcome};
 pub use location::{BalanceBar, LocatedTerm, LocatedVariable, Location, RegimeCell, UnknownInput, strongest};
-pub use next::{Next, SecondExperiment};
-pub use objection::Objection;
-pub use outside::{Curve, Dependence, Outside, Surface, TableTerm};
+pub use next::{NextExperiment, SecondExperiment};
+pub use objection::HeldOutFinding;
+pub use outside::{Curve, Dependence, Surface, TableTerm, UncataloguedTerm};
 pub use record_check::{ChannelCheck, Finding, RecordCheck};
 use serde::{Deserialize, Deserializer, Serialize};
-pub use significance::{DrawnRecords, Ended, Significance};
+pub use significance::{DrawnRecords, Significance, StoppingReason};
 use std::collections::BTreeMap;
 use std::fmt::{self, Display, Formatter};
 pub use verdict::Verdict;
-pub use verification::{BeforeAfter, Misfit, Verification};
+pub use verification::{BeforeAfter, SignalMisfit, Verification};
 
 /// Version of the schema; a new optional field does not change it.
 pub const SCHEMA_VERSION: u32 = 1;
@@ -70,7 +70,7 @@ pub struct Report {
     #[serde(skip_deserializing)]
     pub fit: Option<Convergence>,
     /// The missing term outside the catalogue.
-    pub outside: Option<Outside>,
+    pub outside: Option<UncataloguedTerm>,
     /// The effect of the catalogue that comes nearest to a term outside it.
     #[serde(default)]
     pub nearest: Option<NamedEffect>,
@@ -79,7 +79,7 @@ pub struct Report {
     pub remaining: Option<LocatedTerm>,
     /// Per signal of the held-out record, as `drive_position_m`; empty without `--test`.
     #[serde(default, rename = "gap")]
-    pub misfit: BTreeMap<String, Misfit>,
+    pub misfit: BTreeMap<String, SignalMisfit>,
     /// Further figures of the held-out record; null without `--test`.
     pub verification: Option<Verification>,
     /// Suspects of a file beside the rig file; absent without one.
@@ -107,7 +107,7 @@ pub struct Report {
     #[serde(skip_deserializing)]
     pub checks: Vec<RecordCheck>,
     /// The experiment that resolves the ambiguity, or why there is none.
-    pub next: Option<Next>,
+    pub next: Option<NextExperiment>,
 }
 
 /// Files of a run of the workflow.
@@ -137,24 +137,24 @@ impl Default for InputFiles {
 
 /// A place on the rig; as `drive` or `drive.a` where it is displayed.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-pub struct Where {
+pub struct RigPlace {
     /// drive, load, linkage or supply.
     pub axis: String,
     /// a, b, position or force; null for an effect of a whole axis.
     pub element: Option<String>,
 }
 
-impl Where {
+impl RigPlace {
     /// The place that is displayed so.
     #[must_use]
     pub fn named(name: &str) -> Self {
         let (axis, element) =
             name.split_once('.').map_or((name, None), |(axis, element)| (axis, Some(element)));
-        Where { axis: axis.to_owned(), element: element.map(str::to_owned) }
+        RigPlace { axis: axis.to_owned(), element: element.map(str::to_owned) }
     }
 }
 
-impl Display for Where {
+impl Display for RigPlace {
     fn fmt(&self, to: &mut Formatter<'_>) -> fmt::Result {
         match &self.element {
             Some(element) => write!(to, "{}.{element}", self.axis),
@@ -186,7 +186,7 @@ pub struct NamedEffect {
     pub effect: String,
     /// Where it acts.
     #[serde(rename = "where")]
-    pub place: Where,
+    pub place: RigPlace,
     /// Its numbers, in the order of its sheet.
     #[serde(default)]
     pub parameters: Vec<Quantity>,
@@ -207,7 +207,7 @@ pub struct EffectPlace {
     pub effect: String,
     /// As of a [`NamedEffect`].
     #[serde(rename = "where")]
-    pub place: Where,
+    pub place: RigPlace,
 }
 
 /// An effect that was screened, and how far it got.
@@ -217,7 +217,7 @@ pub struct Candidate {
     pub effect: String,
     /// As of a [`NamedEffect`].
     #[serde(rename = "where")]
-    pub place: Where,
+    pub place: RigPlace,
     /// Screened gain over the null threshold of the final model; above 1 it exceeds what chance gives the best candidate; no test
     /// of this effect.
     pub score: f64,
@@ -241,7 +241,7 @@ pub struct DetectionLimit {
     pub effect: String,
     /// As of a [`NamedEffect`].
     #[serde(rename = "where")]
-    pub place: Where,
+    pub place: RigPlace,
     /// Key of the amplitude.
     pub name: String,
     /// Change from the value at which the rig is the baseline.

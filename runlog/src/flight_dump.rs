@@ -58,7 +58,7 @@ pub fn name(process: &str, cycle: u64, trigger: &str) -> String {
 
 /// How frames are written down.
 #[derive(Clone, Debug)]
-pub struct Log {
+pub struct FrameLogFormat {
     /// Name of the interface in each line.
     pub interface: String,
     /// What turns stamps of CLOCK_MONOTONIC into those of the log, ns.
@@ -74,7 +74,7 @@ pub fn write<'a>(
     event: &Event,
     rows: impl IntoIterator<Item = &'a CycleTiming>,
     frames: impl IntoIterator<Item = &'a FrameRecord>,
-    log: &Log,
+    log: &FrameLogFormat,
 ) -> io::Result<()> {
     let folder = run.join(FOLDER).join(event.name());
     fs::create_dir_all(&folder).map_err(|error| named(&folder, &error))?;
@@ -151,7 +151,7 @@ mod tests {
         let run = tempfile::tempdir().unwrap();
         let rows = [CycleTiming { cycle: 41, ..CycleTiming::default() }, CycleTiming::default()];
         let frame = FrameRecord { stamp_ns: 1_234_567_890, frame: CanFrame::new(0x120, &[0xAB, 0, 1]) };
-        let log = Log { interface: "vcan0".into(), epoch_offset_ns: 1_700_000_000_000_000_000 };
+        let log = FrameLogFormat { interface: "vcan0".into(), epoch_offset_ns: 1_700_000_000_000_000_000 };
         write(run.path(), &event("controller", 42), &rows, [&frame], &log).unwrap();
         let read = |name: &str| {
             fs::read_to_string(run.path().join("flight/controller-0000000042-late").join(name)).unwrap()
@@ -166,7 +166,7 @@ mod tests {
     fn a_process_clears_its_own_dumps_alone() {
         let run = tempfile::tempdir().unwrap();
         clear(run.path(), "controller").unwrap();
-        let log = Log { interface: "bus0".into(), epoch_offset_ns: 0 };
+        let log = FrameLogFormat { interface: "bus0".into(), epoch_offset_ns: 0 };
         for process in ["controller", "controller-drive", "emulator"] {
             write(run.path(), &event(process, 7), &[], [], &log).unwrap();
         }

@@ -59,7 +59,7 @@ pub struct RunDescription<S = Value, M = Machine> {
 /// `summary.json` as the emulator writes it; `bench summary` joins the controllers' reports to it. `E` is an event.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, bound(deserialize = "E: Deserialize<'de> + Default"))]
-pub struct Summary<E = NotedEvent> {
+pub struct Summary<E = RecordedEvent> {
     /// See [`crate::run_folder::SCHEMA_VERSION`].
     pub schema_version: u32,
     /// Largest |set-point - position sensor| while the set-point moves; the controllers know it.
@@ -153,7 +153,7 @@ pub struct Summary<E = NotedEvent> {
 /// An event as it stands in a file, whatever its kind.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct NotedEvent {
+pub struct RecordedEvent {
     /// The rig's cycle.
     pub cycle: u64,
     /// Its name, or an object of its name and its details.

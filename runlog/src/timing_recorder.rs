@@ -10,7 +10,7 @@
 //! In real time only: simulated time is never late.
 
 use crate::candump::FrameRecord;
-use crate::flight_dump::{self, Event, Log};
+use crate::flight_dump::{self, Event, FrameLogFormat};
 use crate::process::Process;
 use crate::run_folder::{LineFile, SCHEMA_VERSION};
 use crate::timing::{self, CycleTiming};
@@ -36,7 +36,7 @@ const ANSWER_NS: u64 = 1_000_000_000;
 
 /// When the cycles of a process are due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Due {
+pub enum Activation {
     /// Every period: a missed cycle was due too.
     EveryPeriod,
     /// When the sensors that wake it arrive. Sensors that were overtaken are reported by [`TimingRecorder::waited`], so the
@@ -52,13 +52,13 @@ pub struct TimingSetup {
     /// Whose name its files and tags have.
     pub process: Process,
     /// When its cycles are due.
-    pub due: Due,
+    pub activation: Activation,
     /// Whether every row is written.
     pub full_timing: bool,
     /// Lateness and execution time that freeze the flight recorder; `None` without one.
     pub flight_late: Option<Duration>,
     /// How the frames of a dump are written.
-    pub log: Log,
+    pub log: FrameLogFormat,
     /// Start of the run, s since 1970.
     pub started_unix_s: f64,
     /// The same moment on the monotonic clock.
@@ -121,8 +121,8 @@ type Ring = FlightRecorder<CycleTiming, FrameRecord>;
 pub struct TimingRecorder {
     folder: PathBuf,
     process: Process,
-    due: Due,
-    log: Log,
+    activation: Activation,
+    log: FrameLogFormat,
     /// The histograms, to which further ones may be added.
     pub account: StageAccount,
     table: Option<LineFile>,
@@ -154,7 +154,7 @@ impl TimingRecorder {
     /// # Errors
     /// What the system says, with the file's name.
     pub fn create(setup: TimingSetup) -> io::Result<Self> {
-        let TimingSetup { folder, process, due, log, .. } = setup;
+        let TimingSetup { folder, process, activation, log, .. } = setup;
         let mut account = StageAccount::new(process.name(), CYCLE);
         let hlog = folder.join(process.hlog());
         let hlog = IntervalLog::create(&hlog, setup.started_unix_s, setup.started)?;
@@ -164,12 +164,12 @@ impl TimingRecorder {
             timing::write_head(table.lines())?;
             Ok::<_, io::Error>(table)
         });
-        let period = if due == Due::EveryPeriod { CYCLE } else { Duration::ZERO };
+        let period = if activation == Activation::EveryPeriod { CYCLE } else { Duration::ZERO };
         let flight = setup.flight_late.map(|limit| (Ring::default(), Lateness { limit, period }));
         Ok(Self {
             folder,
             process,
-            due,
+            activation,
             log,
             account,
             table: table.transpose()?,
@@ -188,7 +188,7 @@ impl TimingRecorder {
     /// What the system says when a file cannot be written.
     pub fn row(&mut self, row: &CycleTiming) -> io::Result<()> {
         let stages = row.stages();
-        let skipped = if self.due == Due::EveryPeriod { row.skipped } else { 0 };
+        let skipped = if self.activation == Activation::EveryPeriod { row.skipped } else { 0 };
         self.account.record(&CycleStages { skipped, ..stages })?;
         self.newest = stages;
         let mut waited_ns = stages.late_ns();
@@ -197,9 +197,9 @@ impl TimingRecorder {
             self.account.record_waited(wait.ns(), row.done_ns.saturating_sub(wait.arrived_ns));
         }
         let first_ns = *self.first_woke_ns.get_or_insert(row.woke_ns);
-        let warm = match self.due {
-            Due::EveryPeriod => row.cycle >= WARM_UP_CYCLES,
-            Due::OnArrival => row.woke_ns.saturating_sub(first_ns) > WARM_UP_NS,
+        let warm = match self.activation {
+            Activation::EveryPeriod => row.cycle >= WARM_UP_CYCLES,
+            Activation::OnArrival => row.woke_ns.saturating_sub(first_ns) > WARM_UP_NS,
         };
         if warm {
             self.vitals.add(&row.vitals);
@@ -352,7 +352,7 @@ fn write_dump(
     dump: &Dump<'_, CycleTiming, FrameRecord>,
     folder: &Path,
     process: Process,
-    log: &Log,
+    log: &FrameLogFormat,
 ) -> io::Result<()> {
     if let Some(replaced) = dump.replaces {
         let name = flight_dump::name(process.name(), replaced.cycle, &replaced.severity.to_string());

@@ -7,8 +7,8 @@ use crate::report;
 use crate::run::RunError;
 use crossbeam_channel::bounded;
 use realtime::{Clock, Freeze, Instant, MonotonicClock};
-use runlog::flight_dump::Log;
-use runlog::timing_recorder::{Due, TimingRecorder, TimingSetup};
+use runlog::flight_dump::FrameLogFormat;
+use runlog::timing_recorder::{Activation, TimingRecorder, TimingSetup};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 /// Capacity of the queue of samples: 16 s of cycles, and as many overtaken sensors.
@@ -50,10 +50,10 @@ pub(crate) fn begin(
     let recorder = TimingRecorder::create(TimingSetup {
         folder: arguments.files.out.clone(),
         process: report::process(arguments.axis.list()),
-        due: Due::OnArrival,
+        activation: Activation::OnArrival,
         full_timing: arguments.full_timing,
         flight_late: (!arguments.no_flight).then(|| Duration::from_micros(arguments.flight_late_us)),
-        log: Log { interface: interface.into(), epoch_offset_ns: started.epoch_offset_ns },
+        log: FrameLogFormat { interface: interface.into(), epoch_offset_ns: started.epoch_offset_ns },
         started_unix_s: started.unix_s,
         started: started.at,
         copies_lines: false,

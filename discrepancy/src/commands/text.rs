@@ -1,6 +1,6 @@
 //! What the commands print: verdict, effects and numbers in a few lines.
 
-use crate::report::{NamedEffect, Objection, Quantity, Report, decimals};
+use crate::report::{HeldOutFinding, NamedEffect, Quantity, Report, decimals};
 use std::fmt::Write as _;
 
 /// The verdict and the names in a few lines.
@@ -21,12 +21,12 @@ pub(super) fn in_words(report: &Report) -> String {
     if let Some(tests) = &report.significance {
         let _ = writeln!(text, "  {}", tests.in_words());
     }
-    if let Some(objection) = report.objection() {
+    if let Some(objection) = report.held_out_finding() {
         let how = match objection {
-            Objection::Worse => "gets worse with it",
-            Objection::NotConfirmed => "does not confirm it",
-            Objection::SomethingMissing => "shows that something is missing",
-            Objection::MoreMissing => "shows that more is missing",
+            HeldOutFinding::Worse => "gets worse with it",
+            HeldOutFinding::NotConfirmed => "does not confirm it",
+            HeldOutFinding::SomethingMissing => "shows that something is missing",
+            HeldOutFinding::MoreMissing => "shows that more is missing",
         };
         let _ = writeln!(text, "  the held-out record {how}");
     }

@@ -28,7 +28,7 @@ use crate::fit::{LEAST, Products, loss};
 use crate::refit::{
     EffectEstimate, Linearisation, Refit, coordinate_columns, prior_deviations, prior_precisions, rig_of,
 };
-use crate::report::{DrawnRecords, EffectPlace, Ended, ExplanationKind, Significance, effect_place};
+use crate::report::{DrawnRecords, EffectPlace, ExplanationKind, Significance, StoppingReason, effect_place};
 use crate::screen::{COLUMN_PENALTY, Columns};
 use plant::RigParameters;
 use rand_core::SeedableRng;
@@ -208,7 +208,7 @@ fn drawn_records(
         let gains: Vec<f64> = (from..most.min(from + AT_ONCE)).into_par_iter().map(&draw).collect();
         ended = gains.into_iter().find_map(|gain| test.take(gain));
     }
-    let ended = ended.unwrap_or(Ended::AllDrawn);
+    let ended = ended.unwrap_or(StoppingReason::AllDrawn);
     DrawnRecords {
         effects,
         observed,

@@ -4,8 +4,8 @@ use super::candidates;
 use super::words;
 use crate::outside::SHIFTS;
 use crate::report::{
-    Curve, Dependence, LocatedTerm, LocatedVariable, NamedEffect, Outside, Quantity, Report, Surface,
-    Verdict, listed,
+    Curve, Dependence, LocatedTerm, LocatedVariable, NamedEffect, Quantity, Report, Surface,
+    UncataloguedTerm, Verdict, listed,
 };
 use model_fit::estimator::Convergence;
 use pagekit::markup::{Cell, charts, heading, number, paragraph, table, words as text_cell};
@@ -195,7 +195,7 @@ fn dependence(label: &str, variables: &[Dependence]) -> String {
     table(label, &["variable", "explains, on data it was not fitted on", "shuffled data reach that"], rows)
 }
 
-fn unknown(outside: &Outside) -> String {
+fn unknown(outside: &UncataloguedTerm) -> String {
     let mut text = paragraph(&format!(
         "No effect of the catalogue explains it. It is in this balance: {}. It depends on:",
         words::balance(&outside.balance)
@@ -222,7 +222,7 @@ fn unknown(outside: &Outside) -> String {
 }
 
 /// Whether the extended rig file has it, in a sentence.
-fn table_added(outside: &Outside) -> String {
+fn table_added(outside: &UncataloguedTerm) -> String {
     if !outside.added {
         let why = outside.why_not.as_ref().map_or(String::new(), |why| format!(": {why}"));
         return format!("It is not added to the model{why}.");

@@ -1,12 +1,12 @@
 //! What the held-out record says: the gap of each signal, and whether the extended model is confirmed.
 
 use super::words;
-use crate::report::{BeforeAfter, Misfit, Report};
+use crate::report::{BeforeAfter, Report, SignalMisfit};
 use pagekit::markup::{Cell, number, paragraph, table, words as text_cell};
 use std::collections::BTreeMap;
 
 pub(super) fn misfit(report: &Report) -> String {
-    let row = |(signal, misfit): (&String, &Misfit)| {
+    let row = |(signal, misfit): (&String, &SignalMisfit)| {
         let (unit, factor) = words::shown_small(words::unit_of(signal));
         let size = |value: f64| number(words::with_unit(&words::short(value * factor), &unit));
         let closed = match misfit.closed {

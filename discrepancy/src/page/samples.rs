@@ -14,8 +14,8 @@ pub(super) const VERDICTS: [Verdict; 6] = [
     Verdict::BadData,
 ];
 
-pub(super) fn at(axis: &str, element: Option<&str>) -> Where {
-    Where { axis: axis.to_owned(), element: element.map(str::to_owned) }
+pub(super) fn at(axis: &str, element: Option<&str>) -> RigPlace {
+    RigPlace { axis: axis.to_owned(), element: element.map(str::to_owned) }
 }
 
 fn quantity(name: &str, value: f64, standard_error: f64, unit: &str, before: Option<f64>) -> Quantity {
@@ -23,7 +23,7 @@ fn quantity(name: &str, value: f64, standard_error: f64, unit: &str, before: Opt
     Quantity { name: name.to_owned(), value, unit: unit.to_owned(), standard_error, before }
 }
 
-fn named(effect: &str, place: Where, parameters: Vec<Quantity>, share_explained: f64) -> NamedEffect {
+fn named(effect: &str, place: RigPlace, parameters: Vec<Quantity>, share_explained: f64) -> NamedEffect {
     NamedEffect {
         effect: effect.to_owned(),
         place,
@@ -85,7 +85,7 @@ pub(super) fn pictures(size: f64) -> Pictures {
     }
 }
 
-fn misfit() -> BTreeMap<String, Misfit> {
+fn misfit() -> BTreeMap<String, SignalMisfit> {
     [
         ("drive_force_N", 2.1, 0.53, 0.5, Some(0.993)),
         ("drive_position_m", 1.9e-4, 2.4e-5, 2.1e-5, Some(0.996)),
@@ -93,7 +93,7 @@ fn misfit() -> BTreeMap<String, Misfit> {
         ("drive_pressure_b_Pa", 404.5, 404.4, 404.0, None),
     ]
     .map(|(signal, before, after, floor, closed)| {
-        (signal.to_owned(), Misfit { before, after, floor, closed })
+        (signal.to_owned(), SignalMisfit { before, after, floor, closed })
     })
     .into_iter()
     .collect()
@@ -265,7 +265,7 @@ fn significance() -> Significance {
         reached,
         largest,
         p_value,
-        ended: Ended::FarAbove,
+        ended: StoppingReason::FarAbove,
         significant: true,
     };
     Significance {
@@ -346,7 +346,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
             let asymmetry = vec![quantity("asymmetry_percent", 47.1, 1.2, "%", None)];
             first.alternatives = vec![named("friction-asymmetry", at("drive", None), asymmetry, 0.938)];
             report.named = vec![first];
-            report.next = Some(Next {
+            report.next = Some(NextExperiment {
                 reason:
                     "While the piston slides, both are a constant force; only break-away and speed differ."
                         .to_owned(),
@@ -367,7 +367,7 @@ pub(super) fn sample(verdict: Verdict) -> (Report, Pictures) {
                 |variable: &str, r2, p_value| Dependence { variable: variable.to_owned(), r2, p_value };
             report.nearest = Some(NamedEffect { share_explained: 0.6, ..leakage() });
             report.remaining = Some(term("drive.flow-b", "p_b"));
-            report.outside = Some(Outside {
+            report.outside = Some(UncataloguedTerm {
                 balance: "drive.force".to_owned(),
                 variables: vec![dependence("x", 0.913, 1.0 / 201.0), dependence("p_a-p_b", 0.08, 0.21)],
                 curve: Some(curve("x", "m", "N", |x| 14.0 * (9.0 * x).sin() + 20.0 * x * x, 0.25)),

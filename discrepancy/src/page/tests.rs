@@ -2,7 +2,7 @@
 
 use super::samples::{VERDICTS, at, pictures, sample};
 use super::*;
-use crate::report::{Misfit, NamedEffect, Objection, Verdict};
+use crate::report::{HeldOutFinding, NamedEffect, SignalMisfit, Verdict};
 use plant::effects::SHEETS;
 
 fn parsed(page: &str) -> roxmltree::Document<'_> {
@@ -132,14 +132,18 @@ fn of_something_outside_the_catalogue_the_rig_file_is_judged_until_a_law_was_add
     report.outside.as_mut().unwrap().added = false;
     let verification = report.verification.as_mut().unwrap();
     verification.confirmed = false;
-    assert_eq!(report.objection(), None, "the rig file leaves 57 times the noise");
+    assert_eq!(report.held_out_finding(), None, "the rig file leaves 57 times the noise");
     let headline = |report: &Report| text(&page(report, &Pictures::default()));
     assert!(headline(&report).starts_with("Something is missing that the catalogue does not have"));
     report.outside.as_mut().unwrap().added = true;
-    assert_eq!(report.objection(), Some(Objection::NotConfirmed), "a law is judged by what it improves");
+    assert_eq!(
+        report.held_out_finding(),
+        Some(HeldOutFinding::NotConfirmed),
+        "a law is judged by what it improves"
+    );
     report.outside.as_mut().unwrap().added = false;
     report.verification.as_mut().unwrap().chi2_before = 1.05;
-    assert_eq!(report.objection(), Some(Objection::NotConfirmed), "noise alone");
+    assert_eq!(report.held_out_finding(), Some(HeldOutFinding::NotConfirmed), "noise alone");
     assert!(headline(&report).starts_with("The held-out record does not confirm what was found outside"));
     report.verification.as_mut().unwrap().worse = true;
     let seen = headline(&report);
@@ -274,7 +278,7 @@ fn text_of_the_report_cannot_become_markup_and_strange_numbers_draw_nothing_stra
         amplitude_variation: Some(f64::NAN),
         alternatives: Vec::new(),
     });
-    let misfit = Misfit { before: f64::NAN, after: f64::INFINITY, floor: 0.0, closed: Some(f64::NAN) };
+    let misfit = SignalMisfit { before: f64::NAN, after: f64::INFINITY, floor: 0.0, closed: Some(f64::NAN) };
     report.misfit.insert("a'<_x".to_owned(), misfit);
     report.candidates[0].score = f64::NAN;
     report.candidates[1].score = f64::INFINITY;

@@ -1,7 +1,7 @@
 //! The box on top: verdict, effects with numbers, closed gap.
 
 use super::words;
-use crate::report::{Explanation, NamedEffect, Objection, Report, Verdict, listed};
+use crate::report::{Explanation, HeldOutFinding, NamedEffect, Report, Verdict, listed};
 use model_fit::WORSE;
 use pagekit::page::escaped;
 
@@ -21,21 +21,21 @@ pub(super) fn title(report: &Report) -> &'static str {
 /// What a finding lacks: the support of the held-out record, or that nothing beside it is missing.
 fn doubt(report: &Report) -> Option<&'static str> {
     let is_outside = report.verdict == Verdict::OutsideCatalogue;
-    match report.objection() {
-        Some(Objection::Worse) if report.is_rig_file_enough() => {
+    match report.held_out_finding() {
+        Some(HeldOutFinding::Worse) if report.is_rig_file_enough() => {
             Some("Fitted parameters make the held-out record worse")
         }
-        Some(Objection::Worse) if is_outside => Some(
+        Some(HeldOutFinding::Worse) if is_outside => Some(
             "Something is missing that the catalogue does not have, and what was fitted makes the held-out record worse",
         ),
-        Some(Objection::Worse) => Some("What was found makes the held-out record worse"),
-        Some(Objection::NotConfirmed) if is_outside => {
+        Some(HeldOutFinding::Worse) => Some("What was found makes the held-out record worse"),
+        Some(HeldOutFinding::NotConfirmed) if is_outside => {
             Some("The held-out record does not confirm what was found outside the catalogue")
         }
-        Some(Objection::NotConfirmed) => Some("The held-out record does not confirm what was found"),
-        Some(Objection::SomethingMissing) => Some("The held-out record shows that something is missing"),
-        Some(Objection::MoreMissing) if is_outside => None,
-        Some(Objection::MoreMissing) => Some("The held-out record shows that more is missing"),
+        Some(HeldOutFinding::NotConfirmed) => Some("The held-out record does not confirm what was found"),
+        Some(HeldOutFinding::SomethingMissing) => Some("The held-out record shows that something is missing"),
+        Some(HeldOutFinding::MoreMissing) if is_outside => None,
+        Some(HeldOutFinding::MoreMissing) => Some("The held-out record shows that more is missing"),
         None if report.verdict == Verdict::Named && report.adequate == Some(false) => {
             Some("Part of what the simulation lacks")
         }
@@ -122,10 +122,10 @@ fn one(named: &NamedEffect, before: &str) -> String {
 /// What the held-out record shows beyond the model.
 fn held_out_excess(report: &Report) -> Option<String> {
     let verification = report.verification.as_ref()?;
-    let than = match report.objection()? {
-        Objection::SomethingMissing => "the rig file",
-        Objection::MoreMissing => "the extended model",
-        Objection::Worse | Objection::NotConfirmed => return None,
+    let than = match report.held_out_finding()? {
+        HeldOutFinding::SomethingMissing => "the rig file",
+        HeldOutFinding::MoreMissing => "the extended model",
+        HeldOutFinding::Worse | HeldOutFinding::NotConfirmed => return None,
     };
     Some(format!(
         "{}, a held-out record, differs from {than} by more than noise: \u{3c7}\u{b2} per degree of freedom {}, of noise at most \
@@ -138,7 +138,7 @@ fn held_out_excess(report: &Report) -> Option<String> {
 
 /// How much of the gap of the held-out record is closed, over the signals that had one.
 fn misfit(report: &Report) -> Option<String> {
-    let is_worse = report.objection() == Some(Objection::Worse);
+    let is_worse = report.held_out_finding() == Some(HeldOutFinding::Worse);
     if report.verdict == Verdict::BadData || report.is_rig_file_enough() && !is_worse {
         return None;
     }

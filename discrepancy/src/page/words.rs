@@ -1,6 +1,6 @@
 //! Numbers, places and signals as a person reads them. What is no number is a dash, never NaN.
 
-use crate::report::{NamedEffect, Quantity, Where, decimals};
+use crate::report::{NamedEffect, Quantity, RigPlace, decimals};
 pub(super) use pagekit::number::NOT_MEASURED;
 pub(super) use pagekit::significant::{fixed, percent, short};
 use plant::effects::sheet;
@@ -117,7 +117,7 @@ pub(super) fn balance(balance: &str) -> String {
     }
 }
 
-pub(super) fn place(effect: &str, place: &Where) -> String {
+pub(super) fn place(effect: &str, place: &RigPlace) -> String {
     let axis = match place.axis.as_str() {
         axis @ ("drive" | "load") => format!("{axis} axis"),
         axis => axis.to_owned(),
@@ -151,8 +151,10 @@ mod tests {
 
     #[test]
     fn places_and_signals_are_said_in_words() {
-        let at =
-            |axis: &str, element: Option<&str>| Where { axis: axis.into(), element: element.map(Into::into) };
+        let at = |axis: &str, element: Option<&str>| RigPlace {
+            axis: axis.into(),
+            element: element.map(Into::into),
+        };
         assert_eq!(place("rod-leakage", &at("load", Some("b"))), "load axis, chamber b");
         assert_eq!(place("time-skew", &at("drive", Some("a"))), "drive axis, pressure sensor a");
         assert_eq!(place("time-skew", &at("drive", Some("force"))), "drive axis, force sensor");

@@ -139,7 +139,7 @@ fn parameters(engine: &Engine<'_>, found: &SelectionResult) -> (Vec<Quantity>, V
 
 fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
     let null_loss = found.null_loss;
-    let objection = found.significance.as_ref().and_then(|tests| Some((tests, tests.objection()?)));
+    let objection = found.significance.as_ref().and_then(|tests| Some((tests, tests.rejection_reason()?)));
     found
         .screened
         .iter()
@@ -233,7 +233,8 @@ pub(crate) fn empty(verdict: Verdict, summary: String) -> Report {
 /// The verdict in a sentence or two.
 pub(super) fn summary(report: &Report) -> String {
     let not_named = report.significance.as_ref().filter(|_| report.nearest.is_none());
-    let not_named = not_named.and_then(|tests| Some(format!(" {} {}.", tests.tested(), tests.objection()?)));
+    let not_named =
+        not_named.and_then(|tests| Some(format!(" {} {}.", tests.tested(), tests.rejection_reason()?)));
     let improbable = report.named_explanation().zip(report.more_probable()).map(|(named, other)| {
         let [named, other] = [named, other].map(|one| 1e2 * one.probability);
         format!(" Its probability is {named:.0} %; another explanation has {other:.0} %.")

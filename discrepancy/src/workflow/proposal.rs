@@ -5,7 +5,7 @@ use crate::engine::Engine;
 use crate::gridded_record::{GriddedRecord, searched_share};
 use crate::next::noise::ReadingNoise;
 use crate::next::{self, Explanation, Proposal, Question};
-use crate::report::{NamedEffect, Next, Report};
+use crate::report::{NamedEffect, NextExperiment, Report};
 use plant::RigParameters;
 use records::ReadOptions;
 use std::path::Path;
@@ -53,7 +53,7 @@ pub(super) fn proposal_for(
             "{} and what explains as much cannot both be written into the rig file beside the rest: nothing can be rehearsed",
             name(&reported.named[at])
         );
-        let next = Next { reason, ..Next::default() };
+        let next = NextExperiment { reason, ..NextExperiment::default() };
         return Some(Proposal { next, experiment_toml: None, rehearsed: Vec::new() });
     }
     let baseline = &rig_file.rig;

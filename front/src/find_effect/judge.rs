@@ -4,7 +4,7 @@
 //! named one; if no more are named than are hidden; and if, without a hidden effect, nothing outside the catalogue is reported.
 
 use crate::FrontError;
-use runlog::discrepancy_report::{NamedEffect, Quantity, Report, Verdict, Where};
+use runlog::discrepancy_report::{NamedEffect, Quantity, Report, RigPlace, Verdict};
 use runlog::run_folder::read_json;
 use serde::Deserialize;
 use std::fmt::{self, Display, Formatter};
@@ -137,7 +137,7 @@ impl HiddenItem {
     }
 
     /// Whether it is this effect of a report, which has the axis of a term, and the element of a reading or a flow.
-    fn is(&self, effect: &str, place: &Where) -> bool {
+    fn is(&self, effect: &str, place: &RigPlace) -> bool {
         let is_there = match self.is_term {
             true => self.place.split('.').next() == Some(&place.axis),
             false => self.place == place.to_string(),

@@ -4,7 +4,7 @@ use crate::files::RunFiles;
 use crate::model::Event;
 use runlog::flight_dump;
 use runlog::run_folder::BUS_LOG;
-use runlog::summary::{NotedEvent, Summary};
+use runlog::summary::{RecordedEvent, Summary};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -55,16 +55,16 @@ fn frames(log: &Path) -> BTreeMap<String, u64> {
 /// What the rig noted near these cycles, but for the missed cycles themselves.
 fn rig_events(summary: &Summary, first: u64, last: u64) -> Vec<String> {
     let near = first.saturating_sub(RIG_WITHIN_CYCLES)..=last + RIG_WITHIN_CYCLES;
-    let mut reported: Vec<_> = summary.events.iter().filter_map(|noted| in_words(noted, &near)).collect();
+    let mut reported: Vec<_> = summary.events.iter().filter_map(|event| in_words(event, &near)).collect();
     if summary.event_count.is_some_and(|count| count > summary.events.len() as u64) {
         reported.push("Of what came often the rig noted the first only.".to_owned());
     }
     reported
 }
 
-fn in_words(noted: &NotedEvent, near: &std::ops::RangeInclusive<u64>) -> Option<String> {
-    let cycle = Some(noted.cycle).filter(|cycle| near.contains(cycle))?;
-    let (name, details) = match &noted.kind {
+fn in_words(event: &RecordedEvent, near: &std::ops::RangeInclusive<u64>) -> Option<String> {
+    let cycle = Some(event.cycle).filter(|cycle| near.contains(cycle))?;
+    let (name, details) = match &event.kind {
         Value::String(name) => (name.as_str(), String::new()),
         Value::Object(kind) => {
             kind.iter().next().map(|(name, details)| (name.as_str(), details.to_string()))?

@@ -170,13 +170,13 @@ mod tests {
 
     #[test]
     fn a_file_that_gives_up_is_told() {
-        struct Gone;
-        impl Read for Gone {
+        struct FailingReader;
+        impl Read for FailingReader {
             fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {
                 Err(io::Error::other("unplugged"))
             }
         }
-        let mut reader = LogReader::new(io::BufReader::new(Gone));
+        let mut reader = LogReader::new(io::BufReader::new(FailingReader));
         assert!(reader.next().unwrap().unwrap_err().to_string().contains("unplugged"));
         assert!(reader.next().is_none());
     }

@@ -1,6 +1,6 @@
 //! Suspects of a file beside the rig file, as a report holds them: with all that an extended rig file needs.
 
-use super::{NamedEffect, Where};
+use super::{NamedEffect, RigPlace};
 use serde::{Deserialize, Serialize};
 
 /// A term that a file of suspects declares beside the catalogue.
@@ -10,7 +10,7 @@ pub struct DeclaredSuspect {
     pub effect: String,
     /// Where it acts.
     #[serde(rename = "where")]
-    pub place: Where,
+    pub place: RigPlace,
     /// What it adds to, as `drive.force`.
     pub adds_to: String,
     /// Expression of the term that is added.

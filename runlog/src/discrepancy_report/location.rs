@@ -1,6 +1,6 @@
 //! Where the rig file and the training records disagree.
 
-use super::{Curve, Dependence, Outside};
+use super::{Curve, Dependence, UncataloguedTerm};
 use serde::{Deserialize, Serialize};
 
 /// Where the baseline and the training records disagree.
@@ -90,9 +90,9 @@ pub struct LocatedVariable {
     pub share: f64,
 }
 
-impl From<Outside> for LocatedTerm {
-    fn from(outside: Outside) -> Self {
-        let Outside { balance, variables, .. } = outside;
+impl From<UncataloguedTerm> for LocatedTerm {
+    fn from(outside: UncataloguedTerm) -> Self {
+        let UncataloguedTerm { balance, variables, .. } = outside;
         let of = |Dependence { variable, r2, .. }: Dependence| LocatedVariable {
             variable,
             log_evidence: None,

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// What to measure next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Next {
+pub struct NextExperiment {
     /// Why this experiment, or why none, in a sentence.
     pub reason: String,
     /// File of the experiment beside the report; null when none discriminates.

@@ -1,10 +1,10 @@
-//! What the held-out record holds against a report: headline, words and exit code follow it.
+//! Finding on the held-out record that contradicts a report: headline, words and exit code follow it.
 
 use super::{Report, Verdict, Verification};
 
-/// What the held-out record holds against a report.
+/// How the held-out record contradicts a report.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Objection {
+pub enum HeldOutFinding {
     /// A signal gets worse with the extended model.
     Worse,
     /// The finding does not improve it significantly; of something outside the catalogue, to which no law was added, the rig file
@@ -23,16 +23,16 @@ impl Report {
         self.verdict == Verdict::NothingMissing && self.small.is_empty()
     }
 
-    /// What the held-out record holds against the report; `None` without one, and of records that cannot be used.
+    /// How the held-out record contradicts the report; `None` where it does not, without one, and of records that cannot be used.
     #[must_use]
-    pub fn objection(&self) -> Option<Objection> {
+    pub fn held_out_finding(&self) -> Option<HeldOutFinding> {
         let held_out = self.verification.as_ref().filter(|_| self.verdict != Verdict::BadData)?;
         let found = !self.is_rig_file_enough();
         match () {
-            () if held_out.worse => Some(Objection::Worse),
-            () if found && !self.is_confirmed(held_out) => Some(Objection::NotConfirmed),
+            () if held_out.worse => Some(HeldOutFinding::Worse),
+            () if found && !self.is_confirmed(held_out) => Some(HeldOutFinding::NotConfirmed),
             () if held_out.more_missing => {
-                Some(if found { Objection::MoreMissing } else { Objection::SomethingMissing })
+                Some(if found { HeldOutFinding::MoreMissing } else { HeldOutFinding::SomethingMissing })
             }
             () => None,
         }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 /// A disagreement that no effect of the catalogue explains.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Outside {
+pub struct UncataloguedTerm {
     /// As in [`super::BalanceBar::balance`].
     pub balance: String,
     /// Variables that it depends on, strongest first.

@@ -39,15 +39,15 @@ pub struct DrawnRecords {
     /// Bound of the p-value; far above the draws an extrapolation by an exponential tail.
     pub p_value: f64,
     /// Why no more were drawn.
-    pub ended: Ended,
+    pub ended: StoppingReason,
     /// Whether `observed` is larger than chance gives, at the level of a twentieth.
     pub significant: bool,
 }
 
-/// How a sequential test ended.
+/// Why a sequential test stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Ended {
+pub enum StoppingReason {
     /// Two draws reached what was observed.
     Reached,
     /// What was observed lies far above all draws.
@@ -59,7 +59,7 @@ pub enum Ended {
 impl Significance {
     /// Why the set has no name, in words after its effects; `None` where it passes.
     #[must_use]
-    pub fn objection(&self) -> Option<&'static str> {
+    pub fn rejection_reason(&self) -> Option<&'static str> {
         if self.gain_without_best <= self.least_gain {
             Some("gains too little outside its best windows")
         } else if self.chance.as_ref().is_some_and(|chance| !chance.significant) {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 /// The misfit of a signal of the held-out record, rms over windows, in the signal's unit.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Misfit {
+pub struct SignalMisfit {
     /// Baseline against measurement.
     #[serde(default = "unknown", deserialize_with = "null_is_nan")]
     pub before: f64,

@@ -6,7 +6,8 @@
 
 pub(crate) use discrepancy::report::Verdict;
 use discrepancy::report::{
-    self, Explanation, LocatedTerm, Misfit, NamedEffect, Next, Outside, Quantity, Verification,
+    self, Explanation, LocatedTerm, NamedEffect, NextExperiment, Quantity, SignalMisfit, UncataloguedTerm,
+    Verification,
 };
 use plant::effects::sheet::{Place, Sheet};
 use std::collections::BTreeMap;
@@ -22,15 +23,15 @@ pub struct Report {
     /// The effect nearest to something outside the catalogue.
     pub(crate) nearest: Option<Named>,
     pub(crate) parameters: Vec<Quantity>,
-    pub(crate) misfit: BTreeMap<String, Misfit>,
+    pub(crate) misfit: BTreeMap<String, SignalMisfit>,
     /// What is missing and not in the catalogue.
-    pub(crate) outside: Option<Outside>,
+    pub(crate) outside: Option<UncataloguedTerm>,
     /// What the model of the rig file lacks, whatever the verdict.
     pub(crate) dependence: Option<LocatedTerm>,
     /// Check of the model on the held-out record.
     pub(crate) verification: Option<Verification>,
     pub(crate) explanations: Vec<Explanation>,
-    pub(crate) next: Option<Next>,
+    pub(crate) next: Option<NextExperiment>,
 }
 
 /// An effect of the catalogue at one of its places.
@@ -118,8 +119,8 @@ impl Report {
     pub(crate) fn claimed_joint(&self) -> Option<f64> {
         let mut excess = [0.0, 0.0];
         let is_whole =
-            |misfit: &&Misfit| misfit.floor > 0.0 && !misfit.before.is_nan() && !misfit.after.is_nan();
-        for Misfit { before, after, floor, .. } in self.misfit.values().filter(is_whole) {
+            |misfit: &&SignalMisfit| misfit.floor > 0.0 && !misfit.before.is_nan() && !misfit.after.is_nan();
+        for SignalMisfit { before, after, floor, .. } in self.misfit.values().filter(is_whole) {
             excess[0] += (before / floor).powi(2) - 1.0;
             excess[1] += (after / floor).powi(2) - 1.0;
         }

@@ -5,10 +5,10 @@ use crossbeam_channel::{Sender, bounded};
 use protocol::can::CanFrame;
 use protocol::frames::{Frame, Sensors, Tick};
 use realtime::{Instant, VitalCounts};
-use runlog::flight_dump::{self, Log};
+use runlog::flight_dump::{self, FrameLogFormat};
 use runlog::process::Process;
 use runlog::timing::{self, CycleTiming};
-use runlog::timing_recorder::{Due, FlightFigures, TimingFigures, TimingSetup};
+use runlog::timing_recorder::{Activation, FlightFigures, TimingFigures, TimingSetup};
 use std::fs;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -32,10 +32,10 @@ impl Bench {
         let recorder = TimingRecorder::create(TimingSetup {
             folder: run.path().into(),
             process: Process::Controller,
-            due: Due::OnArrival,
+            activation: Activation::OnArrival,
             full_timing,
             flight_late: Some(Duration::from_micros(500)),
-            log: Log { interface: "bus0".into(), epoch_offset_ns: 0 },
+            log: FrameLogFormat { interface: "bus0".into(), epoch_offset_ns: 0 },
             started_unix_s: 1.7e9,
             started,
             copies_lines: false,

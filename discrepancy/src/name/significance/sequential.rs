@@ -14,7 +14,7 @@
 //!
 //! Source: Besag, Clifford 1991, Biometrika 78(2): sequential Monte Carlo p-values.
 
-use crate::report::Ended;
+use crate::report::StoppingReason;
 
 /// Level of the test.
 const LEVEL: f64 = 0.05;
@@ -42,29 +42,30 @@ impl Sequential {
     }
 
     /// Takes a draw; how the test ended, where it does with it.
-    pub(super) fn take(&mut self, draw: f64) -> Option<Ended> {
+    pub(super) fn take(&mut self, draw: f64) -> Option<StoppingReason> {
         self.drawn.push(draw);
         self.exceedances += usize::from(draw >= self.observed);
         if self.exceedances >= MOST_EXCEEDANCES {
-            Some(Ended::Reached)
+            Some(StoppingReason::Reached)
         } else if self.has_light_tail && self.drawn.len() >= FEWEST && self.tail() <= FAR {
-            Some(Ended::FarAbove)
+            Some(StoppingReason::FarAbove)
         } else {
             None
         }
     }
 
-    pub(super) fn is_significant(&self, ended: Ended) -> bool {
-        ended != Ended::Reached && (ended == Ended::FarAbove || self.p_value(ended) <= LEVEL)
+    pub(super) fn is_significant(&self, ended: StoppingReason) -> bool {
+        ended != StoppingReason::Reached
+            && (ended == StoppingReason::FarAbove || self.p_value(ended) <= LEVEL)
     }
 
     /// Bound of the p-value after these draws.
-    pub(super) fn p_value(&self, ended: Ended) -> f64 {
+    pub(super) fn p_value(&self, ended: StoppingReason) -> f64 {
         let (reached, drawn) = (self.exceedances as f64, self.drawn.len() as f64);
         match ended {
-            Ended::Reached => reached / drawn,
-            Ended::FarAbove => self.tail(),
-            Ended::AllDrawn => (reached + 1.0) / (drawn + 1.0),
+            StoppingReason::Reached => reached / drawn,
+            StoppingReason::FarAbove => self.tail(),
+            StoppingReason::AllDrawn => (reached + 1.0) / (drawn + 1.0),
         }
     }
 
@@ -90,7 +91,7 @@ mod tests {
     /// Whether it is significant, and the draws that it took.
     fn test(observed: f64, has_light_tail: bool, mut draw: impl FnMut() -> f64) -> (bool, usize) {
         let mut test = Sequential::new(observed, has_light_tail);
-        let ended = (0..DRAWS).find_map(|_| test.take(draw())).unwrap_or(Ended::AllDrawn);
+        let ended = (0..DRAWS).find_map(|_| test.take(draw())).unwrap_or(StoppingReason::AllDrawn);
         (test.is_significant(ended), test.drawn.len())
     }
 
@@ -162,6 +163,6 @@ mod tests {
         for draw in [3.0, 9.0 - 1e-9, 5.0, 4.0] {
             assert_eq!(test.take(draw), None);
         }
-        assert!((test.tail() - 0.2).abs() < 1e-6 && test.p_value(Ended::AllDrawn) == 0.2);
+        assert!((test.tail() - 0.2).abs() < 1e-6 && test.p_value(StoppingReason::AllDrawn) == 0.2);
     }
 }

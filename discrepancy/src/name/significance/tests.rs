@@ -78,8 +78,8 @@ fn what_best_fits_noise_is_not_significant_and_neither_is_a_gain_of_the_best_win
     let mut model = case.fitted(None);
     let tests = case.significance(&model, &[]);
     let chance = tests.chance.as_ref().expect("the rods are not linked");
-    assert!(tests.objection().is_some() && !chance.significant && chance.draws >= 2, "{tests:?}");
-    assert!(chance.reached >= 2 && chance.ended == Ended::Reached, "{tests:?}");
+    assert!(tests.rejection_reason().is_some() && !chance.significant && chance.draws >= 2, "{tests:?}");
+    assert!(chance.reached >= 2 && chance.ended == StoppingReason::Reached, "{tests:?}");
 
     model.squares.clone_from(&case.calibrated.squares);
     let left_out = best_windows(model.squares.len());
@@ -87,9 +87,9 @@ fn what_best_fits_noise_is_not_significant_and_neither_is_a_gain_of_the_best_win
     model.squares[..left_out].iter_mut().for_each(|square| *square *= 0.5);
     let tests = case.significance(&model, &[]);
     assert!(tests.gain > MIN_LOSS_REDUCTION && tests.gain_without_best < 0.0, "{tests:?}");
-    assert_eq!(tests.objection(), Some("gains too little outside its best windows"));
+    assert_eq!(tests.rejection_reason(), Some("gains too little outside its best windows"));
     model.squares.iter_mut().for_each(|square| *square *= 0.9);
-    assert_eq!(case.significance(&model, &[]).objection(), None);
+    assert_eq!(case.significance(&model, &[]).rejection_reason(), None);
 }
 
 #[test]
@@ -112,9 +112,12 @@ fn a_strong_effect_is_significant_after_five_draws_with_any_number_of_threads() 
     let tests = of(1);
     assert_eq!(format!("{tests:?}"), format!("{:?}", of(3)));
     let [chance, other] = [&tests.chance, &tests.other].map(|drawn| drawn.as_ref().expect("both were drawn"));
-    assert_eq!(tests.objection(), None, "{tests:?}");
+    assert_eq!(tests.rejection_reason(), None, "{tests:?}");
     for drawn in [chance, other] {
-        assert!(drawn.ended == Ended::FarAbove && drawn.draws == 5 && drawn.p_value < 0.005, "{tests:?}");
+        assert!(
+            drawn.ended == StoppingReason::FarAbove && drawn.draws == 5 && drawn.p_value < 0.005,
+            "{tests:?}"
+        );
     }
     assert_eq!(other.effects[0].effect, "dead-volume");
     // The other way round the records look as if drawn with what was tested.

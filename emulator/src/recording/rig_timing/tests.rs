@@ -5,9 +5,9 @@ use crate::event::EventKind;
 use protocol::can::CanFrame;
 use protocol::frames::Frame;
 use protocol::frames::ValveCommand;
-use runlog::flight_dump::{self, Log};
+use runlog::flight_dump::{self, FrameLogFormat};
 use runlog::timing::{Exchange, read as read_rows};
-use runlog::timing_recorder::{Due, FlightFigures};
+use runlog::timing_recorder::{Activation, FlightFigures};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Duration;
@@ -18,10 +18,10 @@ fn rig_timing(folder: &Path, full_timing: bool) -> RigTiming {
     let setup = TimingSetup {
         folder: folder.into(),
         process: Process::Emulator,
-        due: Due::EveryPeriod,
+        activation: Activation::EveryPeriod,
         full_timing,
         flight_late: Some(Duration::from_micros(500)),
-        log: Log { interface: "bus0".into(), epoch_offset_ns: 0 },
+        log: FrameLogFormat { interface: "bus0".into(), epoch_offset_ns: 0 },
         started_unix_s: 0.0,
         started: realtime::Instant::from_nanos(0),
         copies_lines: false,
