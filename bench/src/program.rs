@@ -114,20 +114,20 @@ fn spread_runs(arguments: &SpreadArguments) -> Result<Exit, RunsError> {
 }
 
 fn report_on(arguments: &ReportArguments) -> Result<Exit, ReportError> {
-    let chosen = latency::choice::choose(&arguments.folders, &arguments.group)?;
-    if arguments.compare && chosen.len() < 2 {
+    let selected = latency::choice::select_runs(&arguments.folders, &arguments.group)?;
+    if arguments.compare && selected.len() < 2 {
         return Err(ReportError::OneRun);
     }
     let compare = arguments.compare || !arguments.group.is_empty();
-    let mut made = latency::make(&chosen, arguments.title.as_deref(), compare);
+    let mut report = latency::make_report(&selected, arguments.title.as_deref(), compare);
     if let Some(file) = &arguments.bounds {
-        made.judge(file)?;
+        report.judge(file)?;
     }
-    let out = arguments.out.clone().unwrap_or_else(|| latency::choice::default_out(&chosen));
-    latency::output::write(&made, &out, arguments.markdown_only)?;
-    print(&latency::markdown::table(&made.report));
+    let out = arguments.out.clone().unwrap_or_else(|| latency::choice::default_out(&selected));
+    latency::output::write(&report, &out, arguments.markdown_only)?;
+    print(&latency::markdown::table(&report.report));
     print(&format!("\n  report in {}", out.display()));
-    Ok(if made.is_broken() { Exit::BoundBroken } else { Exit::Good })
+    Ok(if report.is_broken() { Exit::BoundBroken } else { Exit::Good })
 }
 
 fn name_cause(file: &Path) -> Result<Exit, ReportError> {

@@ -39,10 +39,14 @@ pub(crate) fn judge(text: &str, file: &Path, report: &Report) -> Result<Vec<Boun
     root.finish()?;
     let mut figures = bounds.keys();
     figures.sort_unstable();
-    figures.iter().map(|figure| one(figure, &mut bounds, report)).collect()
+    figures.iter().map(|figure| judge_bound(figure, &mut bounds, report)).collect()
 }
 
-fn one(figure: &str, bounds: &mut Section<'_>, report: &Report) -> Result<BoundResult, SettingsError> {
+fn judge_bound(
+    figure: &str,
+    bounds: &mut Section<'_>,
+    report: &Report,
+) -> Result<BoundResult, SettingsError> {
     let example = format!("\"{figure}\" = {{ max = 50000 }}, {{ min = 1 }} or with both");
     let bound = bounds.section_as(figure, Some(&example))?;
     let (min, max) = match bound {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 /// A run's folder and the group it was put in.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Chosen {
+pub struct SelectedRun {
     /// The run's folder.
     pub folder: PathBuf,
     /// Its group; nothing when its conditions.json says which.
@@ -18,19 +18,19 @@ pub struct Chosen {
 ///
 /// # Errors
 /// [`ReportError`]: a folder that cannot be read or holds no run, a group that is not written so.
-pub fn choose(folders: &[PathBuf], groups: &[String]) -> Result<Vec<Chosen>, ReportError> {
-    let mut chosen = Vec::new();
+pub fn select_runs(folders: &[PathBuf], groups: &[String]) -> Result<Vec<SelectedRun>, ReportError> {
+    let mut selected = Vec::new();
     for folder in folders {
-        chosen.extend(runs_in(folder)?.into_iter().map(|folder| Chosen { folder, group: None }));
+        selected.extend(runs_in(folder)?.into_iter().map(|folder| SelectedRun { folder, group: None }));
     }
     for group in groups {
         let parted = group.split_once('=').filter(|(name, folder)| !name.is_empty() && !folder.is_empty());
         let (name, folder) = parted.ok_or_else(|| ReportError::Group(group.clone()))?;
         let group = Some(name.to_owned());
         let of_group = runs_in(Path::new(folder))?.into_iter();
-        chosen.extend(of_group.map(|folder| Chosen { folder, group: group.clone() }));
+        selected.extend(of_group.map(|folder| SelectedRun { folder, group: group.clone() }));
     }
-    Ok(chosen)
+    Ok(selected)
 }
 
 fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
@@ -45,13 +45,14 @@ fn runs_in(folder: &Path) -> Result<Vec<PathBuf>, ReportError> {
 }
 
 /// Where a report goes that was given no folder: into its run's, or for several into `report` in the folder that holds them all.
-pub fn default_out(chosen: &[Chosen]) -> PathBuf {
-    let [first, others @ ..] = chosen else { return PathBuf::from("report") };
+pub fn default_out(selected: &[SelectedRun]) -> PathBuf {
+    let [first, others @ ..] = selected else { return PathBuf::from("report") };
     if others.is_empty() {
         return first.folder.clone();
     }
     // Whole paths, so that runs named from different places have something in common.
-    let whole = |chosen: &Chosen| chosen.folder.canonicalize().unwrap_or_else(|_| chosen.folder.clone());
+    let whole =
+        |selected: &SelectedRun| selected.folder.canonicalize().unwrap_or_else(|_| selected.folder.clone());
     let mut common = whole(first).parent().map(Path::to_path_buf).unwrap_or_default();
     for other in others {
         let other = whole(other);
@@ -75,24 +76,25 @@ mod tests {
         let at = |name: &str| folder.path().join(name);
         ["a/2", "a/1", "b/1"].iter().for_each(|name| run(&at(name)));
         std::fs::create_dir_all(at("a/report")).unwrap();
-        let chosen = choose(&[at("a")], &[format!("new={}", at("b/1").display())]).unwrap();
-        let reported: Vec<_> = chosen.iter().map(|one| (one.folder.clone(), one.group.as_deref())).collect();
+        let selected = select_runs(&[at("a")], &[format!("new={}", at("b/1").display())]).unwrap();
+        let reported: Vec<_> =
+            selected.iter().map(|one| (one.folder.clone(), one.group.as_deref())).collect();
         assert_eq!(reported, [(at("a/1"), None), (at("a/2"), None), (at("b/1"), Some("new"))]);
         let whole = |path: PathBuf| path.canonicalize().unwrap();
-        assert_eq!(default_out(&chosen), whole(folder.path().into()).join("report"));
-        assert_eq!(default_out(&chosen[..2]), whole(at("a")).join("report"));
-        assert_eq!(default_out(&chosen[..1]), at("a/1"));
+        assert_eq!(default_out(&selected), whole(folder.path().into()).join("report"));
+        assert_eq!(default_out(&selected[..2]), whole(at("a")).join("report"));
+        assert_eq!(default_out(&selected[..1]), at("a/1"));
     }
 
     #[test]
     fn what_holds_no_run_is_refused() {
         let folder = tempfile::tempdir().unwrap();
-        let reported = choose(&[folder.path().into()], &[]).unwrap_err();
+        let reported = select_runs(&[folder.path().into()], &[]).unwrap_err();
         assert!(reported.to_string().contains("holds no run"), "{reported}");
         assert!(matches!(
-            choose(&[folder.path().join("none")], &[]),
+            select_runs(&[folder.path().join("none")], &[]),
             Err(ReportError::File(FileError::Read { .. }))
         ));
-        assert!(matches!(choose(&[], &["new".into()]), Err(ReportError::Group(_))));
+        assert!(matches!(select_runs(&[], &["new".into()]), Err(ReportError::Group(_))));
     }
 }

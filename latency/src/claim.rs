@@ -39,12 +39,12 @@ pub(crate) fn claim(runs: &[RunFiles], conditions: &Conditions) -> Claim {
     Claim { supported, sentence, reasons, not_controlled }
 }
 
-/// What is known of a run that still goes on.
+/// Judgement of a run that has not ended.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct SoFar {
-    /// What speaks against a claim, whatever comes.
+pub struct InterimClaim {
+    /// Reasons against a claim that the rest of the run cannot remove.
     pub against: Vec<String>,
-    /// What a claim cannot do without and is not there yet.
+    /// Requirements of a claim that are not yet met.
     pub missing: Vec<String>,
 }
 
@@ -69,10 +69,10 @@ impl CycleCount {
 }
 
 /// Judges a run that still goes on by the same rules, after `count` cycles.
-pub fn so_far(run: &RunFiles, conditions: &Conditions, count: CycleCount) -> SoFar {
+pub fn interim_claim(run: &RunFiles, conditions: &Conditions, count: CycleCount) -> InterimClaim {
     let (runs, counts) = (std::slice::from_ref(run), [count]);
     let against = [not_granted(runs), disturbed(runs, conditions, &counts)].concat();
-    SoFar { against, missing: missing(runs, conditions, &counts) }
+    InterimClaim { against, missing: missing(runs, conditions, &counts) }
 }
 
 fn reasons(runs: &[RunFiles], conditions: &Conditions) -> Vec<String> {
@@ -280,8 +280,8 @@ mod tests {
 
     #[test]
     fn each_reason_is_told() {
-        type Spoil = fn(&mut RunFiles);
-        let cases: [(&str, Spoil); 18] = [
+        type RunEdit = fn(&mut RunFiles);
+        let cases: [(&str, RunEdit); 18] = [
             ("SCHED_FIFO", |run| {
                 edit_run(run, |file| file["realtime_granted"] = json!([LOCKED, "pinned to CPU 0"]));
             }),
@@ -318,9 +318,9 @@ mod tests {
             ("nobody committed", |run| run.conditions.get_or_insert_default().uncommitted_files = Some(2)),
             ("counts allocations", |run| edit_run(run, |file| file["counts_allocations"] = json!(true))),
         ];
-        for (words, spoil) in cases {
+        for (words, edit) in cases {
             let mut runs = good();
-            spoil(&mut runs[1]);
+            edit(&mut runs[1]);
             let reported = judged(&runs);
             assert!(!reported.supported && reported.reasons.len() == 1, "{words}: {:?}", reported.reasons);
             assert!(reported.reasons[0].contains(words), "{:?}", reported.reasons);

@@ -37,11 +37,11 @@ pub fn conditions(runs: &[RunFiles]) -> Conditions {
     }
 }
 
-/// Facts gathered by name, in the order in which they first came.
+/// Collects the values of facts by name, in the order of their first appearance.
 #[derive(Default)]
-struct Facts(Vec<(String, Vec<String>)>);
+struct FactCollector(Vec<(String, Vec<String>)>);
 
-impl Facts {
+impl FactCollector {
     fn add(&mut self, name: &str, value: &str) {
         let place = self.0.iter().position(|(known, _)| known == name).unwrap_or_else(|| {
             self.0.push((name.to_owned(), Vec::new()));
@@ -50,7 +50,7 @@ impl Facts {
         add_new(&mut self.0[place].1, value.to_owned());
     }
 
-    fn reported(self) -> Vec<Fact> {
+    fn into_facts(self) -> Vec<Fact> {
         let reported = |(name, mut values): (String, Vec<String>)| {
             let more = values.len().saturating_sub(VALUES_SHOWN);
             values.truncate(VALUES_SHOWN);
@@ -65,7 +65,7 @@ impl Facts {
 
 /// Everything under `machine` of run.json, nested objects flattened, and the build.
 fn machine(runs: &[RunFiles]) -> Vec<Fact> {
-    let mut facts = Facts::default();
+    let mut facts = FactCollector::default();
     for run in runs {
         if let Some(file) = &run.run {
             flatten(&mut facts, "", &file.json["machine"]);
@@ -87,10 +87,10 @@ fn machine(runs: &[RunFiles]) -> Vec<Fact> {
             facts.add(&format!("{process} version"), &reported.version);
         }
     }
-    facts.reported()
+    facts.into_facts()
 }
 
-fn flatten(facts: &mut Facts, name: &str, value: &Value) {
+fn flatten(facts: &mut FactCollector, name: &str, value: &Value) {
     match value {
         Value::Object(parts) => {
             for (key, part) in parts {
@@ -114,7 +114,7 @@ fn text(value: &Value) -> String {
 }
 
 fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
-    let mut facts = Facts::default();
+    let mut facts = FactCollector::default();
     for run in runs {
         let emulator = run.description().map(|description| (EMULATOR, &description.emulator_command_line));
         let controllers = run.controller_reports().map(|(process, report)| (process, &report.command_line));
@@ -128,11 +128,11 @@ fn command_lines(runs: &[RunFiles]) -> Vec<Fact> {
             facts.add(&format!("ping-pong {name}"), command);
         }
     }
-    facts.reported()
+    facts.into_facts()
 }
 
 fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
-    let mut facts = Facts::default();
+    let mut facts = FactCollector::default();
     for run in runs {
         let emulator = run
             .description()
@@ -149,7 +149,7 @@ fn privileges(runs: &[RunFiles]) -> Vec<Fact> {
             }
         }
     }
-    facts.reported()
+    facts.into_facts()
 }
 
 #[cfg(test)]

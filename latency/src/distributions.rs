@@ -96,12 +96,12 @@ pub(crate) fn shown(
     runs: &[BTreeMap<String, Series>],
     sums: &BTreeMap<String, Samples>,
 ) -> Vec<Distribution> {
-    let mut shown: Vec<_> = sums.iter().map(|(tag, samples)| one(tag, samples, runs)).collect();
+    let mut shown: Vec<_> = sums.iter().map(|(tag, samples)| distribution(tag, samples, runs)).collect();
     shown.sort_by_key(|distribution| kinds::place(&distribution.name));
     shown
 }
 
-fn one(tag: &str, samples: &Samples, runs: &[BTreeMap<String, Series>]) -> Distribution {
+fn distribution(tag: &str, samples: &Samples, runs: &[BTreeMap<String, Series>]) -> Distribution {
     let kind = kinds::of(tag);
     let mut maxima = Vec::new();
     for (run, series) in runs.iter().enumerate().filter_map(|(run, all)| Some((run, all.get(tag)?))) {
@@ -124,7 +124,7 @@ fn one(tag: &str, samples: &Samples, runs: &[BTreeMap<String, Series>]) -> Distr
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::hlog::Passing;
+    use crate::hlog::BorrowedInterval;
     use crate::made_up;
     use serde_json::json;
 
@@ -133,7 +133,7 @@ mod tests {
         let mut run = RunFiles::default();
         let mut take = |tag: &str, start_s: f64, duration_s: f64, values_ns: &[u64]| {
             let samples: Samples = values_ns.iter().copied().collect();
-            run.take_interval(Passing { tag, start_s, duration_s, histogram: samples.histogram() });
+            run.take_interval(BorrowedInterval { tag, start_s, duration_s, histogram: samples.histogram() });
         };
         take("emulator-wakeup", 0.0, 1.0, &[5, 100]);
         take("emulator-wakeup", 1.0, 1.0, &[7]);

@@ -16,7 +16,7 @@ pub(crate) mod rules;
 
 use super::files::{EMULATOR, RunFiles};
 use super::findings::lost_by_gaps;
-use super::model::{AroundRow, Event, ProbeGap};
+use super::model::{Event, NearbyCycle, ProbeGap};
 use super::probe::{self, Gap};
 use protocol::periods::CYCLE_NS;
 use rules::LatenessEvidence;
@@ -38,9 +38,9 @@ const GAPS_WITHIN_NS: u64 = 2 * CYCLE_NS;
 /// Gaps shown for an event, the longest.
 const GAPS_SHOWN: usize = 20;
 
-/// A row with what is unusual about it.
+/// A late, slow or missed cycle.
 #[derive(Clone, Copy, Debug)]
-struct Late {
+struct LateCycle {
     /// Place in the process's rows.
     place: usize,
     /// Cycles that this process missed right before.
@@ -51,7 +51,7 @@ struct Late {
     slow_ns: u64,
 }
 
-impl Late {
+impl LateCycle {
     fn severity_ns(&self) -> u64 {
         self.late_ns.max(self.slow_ns)
     }
@@ -101,7 +101,7 @@ fn execution_ns(row: &CycleTiming) -> u64 {
     row.done_ns.saturating_sub(row.woke_ns)
 }
 
-fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<Late> {
+fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<LateCycle> {
     let mut executions: Vec<_> = rows.iter().map(execution_ns).collect();
     executions.sort_unstable();
     let usual_ns = executions.get(executions.len() / 2).copied().unwrap_or_default();
@@ -113,7 +113,7 @@ fn late_rows(process: &str, rows: &[CycleTiming], run: &RunFiles) -> Vec<Late> {
             _ => missed_by_controller(place, process, run, lost),
         };
         let late_ns = row.woke_ns.saturating_sub(due_ns);
-        Late { place, missed, due_ns, late_ns, slow_ns: execution_ns(row).saturating_sub(usual_ns) }
+        LateCycle { place, missed, due_ns, late_ns, slow_ns: execution_ns(row).saturating_sub(usual_ns) }
     };
     let all = (0..rows.len()).map(with_late);
     all.filter(|late| late.missed > 0 || late.severity_ns() > EVENT_OVER_NS).collect()
@@ -152,8 +152,8 @@ fn missed_by_controller(place: usize, process: &str, run: &RunFiles, lost: u64) 
     (missed, first_ns.min(row.due_ns))
 }
 
-fn clusters<'a>(late: &'a [Late], rows: &[CycleTiming]) -> Vec<&'a [Late]> {
-    let near = |before: &Late, after: &Late| {
+fn clusters<'a>(late: &'a [LateCycle], rows: &[CycleTiming]) -> Vec<&'a [LateCycle]> {
+    let near = |before: &LateCycle, after: &LateCycle| {
         rows[after.place].cycle - after.missed <= rows[before.place].cycle + CLUSTER_CYCLES
     };
     late.chunk_by(near).collect()
@@ -162,16 +162,16 @@ fn clusters<'a>(late: &'a [Late], rows: &[CycleTiming]) -> Vec<&'a [Late]> {
 fn event(
     place_of_run: usize,
     process: &str,
-    cluster: &[Late],
+    cluster: &[LateCycle],
     run: &RunFiles,
-    all_late: &[(&str, Vec<Late>)],
+    all_late: &[(&str, Vec<LateCycle>)],
 ) -> Event {
     let rows = &run.rows[process];
     // A cluster is never empty.
     let worst = cluster.iter().max_by_key(|late| late.severity_ns()).copied().unwrap_or(cluster[0]);
     let row = rows[worst.place];
-    let seen = seen(process, cluster, &worst, run, all_late);
-    let reported = rules::cause(&seen);
+    let lateness = lateness_evidence(process, cluster, &worst, run, all_late);
+    let reported = rules::cause(&lateness);
     let due_ns = worst.due_ns;
     Event {
         run: place_of_run,
@@ -184,21 +184,21 @@ fn event(
         cause: reported.cause,
         sentence: reported.sentence,
         evidence: reported.evidence,
-        around: around(row.cycle, worst.missed, due_ns, run),
+        nearby_cycles: nearby_cycles(row.cycle, worst.missed, due_ns, run),
         probe: gaps_around(due_ns, row.done_ns, run.gaps.as_deref().unwrap_or_default()),
-        waited_ns: seen.waited_ns,
-        machine_ran: seen.machine_ran(),
+        waited_ns: lateness.waited_ns,
+        machine_ran: lateness.machine_ran(),
         ..Event::default()
     }
 }
 
 /// Everything that the rules may know of an event.
-fn seen(
+fn lateness_evidence(
     process: &str,
-    cluster: &[Late],
-    worst: &Late,
+    cluster: &[LateCycle],
+    worst: &LateCycle,
     run: &RunFiles,
-    all_late: &[(&str, Vec<Late>)],
+    all_late: &[(&str, Vec<LateCycle>)],
 ) -> LatenessEvidence {
     let rows = &run.rows[process];
     let row = rows[worst.place];
@@ -207,7 +207,7 @@ fn seen(
     let until = rows[last].cycle + CONTINUED_WITHIN_CYCLES;
     let after = rows[cluster[0].place..].iter().take_while(|row| row.cycle <= until);
     let same_time =
-        |late: &&Late, rows: &[CycleTiming]| late.due_ns < to_ns && rows[late.place].done_ns > from_ns;
+        |late: &&LateCycle, rows: &[CycleTiming]| late.due_ns < to_ns && rows[late.place].done_ns > from_ns;
     let others = all_late.iter().filter(|(other, _)| *other != process).filter_map(|(other, late)| {
         let rows = run.rows[*other].as_slice();
         let worst = late.iter().filter(|late| same_time(late, rows)).max_by_key(|late| late.severity_ns())?;
@@ -229,7 +229,7 @@ fn seen(
         continued: after.map(|row| row.vitals.continued).sum(),
         knows_run_delay: rows.iter().any(|row| row.vitals.run_delay_ns > 0),
         waited_ns: rows[cluster[0].place..=last].iter().map(|row| row.vitals.run_delay_ns).sum(),
-        together_ns: cluster.iter().map(Late::severity_ns).sum(),
+        together_ns: cluster.iter().map(LateCycle::severity_ns).sum(),
         probe_watched: probe::watched(run.gaps.as_deref(), cpu, to_ns),
         still_ns: covered(&|gap| gap.cpu == cpu && !gap.another_ran),
         another_ns: covered(&|gap| gap.cpu == cpu && gap.another_ran),
@@ -244,11 +244,11 @@ fn seen(
     }
 }
 
-fn around(cycle: u64, missed: u64, due_ns: u64, run: &RunFiles) -> BTreeMap<String, Vec<AroundRow>> {
+fn nearby_cycles(cycle: u64, missed: u64, due_ns: u64, run: &RunFiles) -> BTreeMap<String, Vec<NearbyCycle>> {
     let (first, last) = (cycle.saturating_sub(missed + AROUND_CYCLES), cycle + AROUND_CYCLES);
     let us = |ns: u64| ns as f64 / 1000.0;
     let from_due_us = |ns: u64| (i128::from(ns) - i128::from(due_ns)) as f64 / 1000.0;
-    let shown = |row: &CycleTiming| AroundRow {
+    let shown = |row: &CycleTiming| NearbyCycle {
         cycle: row.cycle,
         due_us: from_due_us(row.due_ns),
         late_us: us(row.woke_ns.saturating_sub(row.due_ns)),

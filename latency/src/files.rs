@@ -1,6 +1,6 @@
 //! What a run left in its folder, read as far as it is there: what is missing or damaged is reported, and the rest is used.
 
-use super::hlog::{self, Passing};
+use super::hlog::{self, BorrowedInterval};
 use super::joined::Series;
 use super::json_files::{ControllerFile, RunFile, SummaryFile};
 use super::kinds::{PING_PONG, PING_PONGS, ROUND_TRIPS};
@@ -146,7 +146,7 @@ impl RunFiles {
     /// A log, up to where it is damaged.
     fn take_log(&mut self, name: &str) {
         let Some(text) = self.text(name) else { return };
-        let read = hlog::each(&text, |passing| self.take_interval(passing));
+        let read = hlog::each(&text, |interval| self.take_interval(interval));
         if let Err(error) = read {
             self.lacks.push(format!("{name} is damaged and was read up to there: {error}"));
         }
@@ -164,8 +164,8 @@ impl RunFiles {
         }
     }
 
-    pub(crate) fn take_interval(&mut self, passing: Passing<'_>) {
-        let Passing { tag, start_s, duration_s, histogram } = passing;
+    pub(crate) fn take_interval(&mut self, interval: BorrowedInterval<'_>) {
+        let BorrowedInterval { tag, start_s, duration_s, histogram } = interval;
         // Logs from before the load axis had a round trip of its own name the drive's without its axis.
         let tag = if tag == "round-trip" { ROUND_TRIPS[0] } else { tag };
         let series = self.logged.entry(tag.to_owned()).or_default();

@@ -70,11 +70,11 @@ fn stopped(runs: &[RunFiles], events: &[Event], cause: Cause) -> Option<Finding>
     let reports = runs.iter().flat_map(RunFiles::process_reports);
     let of_process = reports.filter(|(process, _)| (*process == EMULATOR) == is_rig);
     let counted = of_process.map(|(_, report)| report.timing.vitals.continued).sum::<u64>();
-    let seen = of(events, cause).count() as u64;
-    let count = counted.max(seen);
+    let explained = of(events, cause).count() as u64;
+    let count = counted.max(explained);
     let who = if is_rig { "The emulator" } else { "A controller" };
     let effect =
-        if seen > 0 { format!(", at worst for {}", worst(of(events, cause))) } else { String::new() };
+        if explained > 0 { format!(", at worst for {}", worst(of(events, cause))) } else { String::new() };
     (count > 0).then(|| Finding {
         cause,
         count,

@@ -41,9 +41,9 @@ pub struct LogError {
     pub reason: String,
 }
 
-/// A histogram of a stretch of time, as it is read: gone when the next one comes, since an hour of them would fill the memory.
+/// An interval while its log is read: dropped before the next one is read, since an hour of them would fill the memory.
 #[derive(Clone, Copy, Debug)]
-pub struct Passing<'a> {
+pub struct BorrowedInterval<'a> {
     /// Name of the distribution.
     pub tag: &'a str,
     /// Start, s from the log's base time.
@@ -58,7 +58,7 @@ pub struct Passing<'a> {
 ///
 /// # Errors
 /// [`LogError`] at the first line that is no interval; those before it were handed out.
-pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogError> {
+pub fn each(text: &str, mut take: impl FnMut(BorrowedInterval<'_>)) -> Result<(), LogError> {
     let mut deserializer = Deserializer::new();
     let whole = text.rfind('\n').map_or("", |end| &text[..=end]);
     for (place, line) in whole.split_inclusive('\n').enumerate() {
@@ -68,7 +68,7 @@ pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogErro
                 Ok(LogEntry::Interval(reported)) => {
                     let histogram =
                         decode(reported.encoded_histogram(), &mut deserializer).map_err(failed)?;
-                    take(Passing {
+                    take(BorrowedInterval {
                         tag: reported.tag().map_or("", |tag| tag.as_str()),
                         start_s: reported.start_timestamp().as_secs_f64(),
                         duration_s: reported.duration().as_secs_f64(),
@@ -86,7 +86,7 @@ pub fn each(text: &str, mut take: impl FnMut(Passing<'_>)) -> Result<(), LogErro
 /// Reads a log of few intervals.
 pub fn read(text: &str) -> Result<Vec<Interval>, LogError> {
     let mut intervals = Vec::new();
-    each(text, |Passing { tag, start_s, duration_s, histogram }| {
+    each(text, |BorrowedInterval { tag, start_s, duration_s, histogram }| {
         let samples = Samples::from_histogram(histogram);
         intervals.push(Interval { tag: tag.to_owned(), start_s, duration_s, samples });
     })?;

@@ -40,13 +40,13 @@ pub(crate) struct OneWay {
     pub below_zero: u64,
 }
 
-type OfAxis = fn(&CycleTiming) -> Exchange;
+type ExchangeOfAxis = fn(&CycleTiming) -> Exchange;
 
 /// One-way latencies of a run with rows of both sides.
 pub(crate) fn one_way(run: &RunFiles) -> OneWay {
     let mut found = OneWay::default();
     let Some(rig) = run.rows.get(EMULATOR) else { return found };
-    let axes: [(&str, OfAxis); 2] =
+    let axes: [(&str, ExchangeOfAxis); 2] =
         [(Axis::Drive.name(), |row| row.drive), (Axis::Load.name(), |row| row.load)];
     for (axis, exchange) in axes {
         let controllers = run.rows.iter().filter(|(process, _)| *process != EMULATOR);

@@ -67,7 +67,7 @@ mod tallies;
 #[cfg(test)]
 mod made_up;
 
-use self::choice::Chosen;
+use self::choice::SelectedRun;
 use self::files::RunFiles;
 use self::joined::Series;
 use self::model::{Report, SCHEMA, SCHEMA_VERSION};
@@ -135,9 +135,9 @@ pub struct ReportWithSources {
 }
 
 /// Makes the report of these runs, with groups side by side if asked for.
-pub fn make(chosen: &[Chosen], title: Option<&str>, compare: bool) -> ReportWithSources {
-    let runs = chosen.iter().map(|chosen| RunFiles::read(&chosen.folder)).collect();
-    let groups: Vec<_> = chosen.iter().map(|chosen| chosen.group.as_deref()).collect();
+pub fn make_report(selected: &[SelectedRun], title: Option<&str>, compare: bool) -> ReportWithSources {
+    let runs = selected.iter().map(|selected| RunFiles::read(&selected.folder)).collect();
+    let groups: Vec<_> = selected.iter().map(|selected| selected.group.as_deref()).collect();
     from_files(runs, &groups, title, compare)
 }
 

@@ -216,8 +216,9 @@ pub struct Event {
     pub sentence: String,
     /// What speaks for it, and what against, a sentence each.
     pub evidence: Vec<String>,
-    /// Rows of both processes around it, by process.
-    pub around: BTreeMap<String, Vec<AroundRow>>,
+    /// Cycles of both processes around it, by process.
+    #[serde(rename = "around")]
+    pub nearby_cycles: BTreeMap<String, Vec<NearbyCycle>>,
     /// Gaps that the probe saw around it, by time.
     pub probe: Vec<ProbeGap>,
     /// How long it was ready and waited for a CPU, over all its cycles, ns.
@@ -239,7 +240,7 @@ pub struct Event {
 
 /// One cycle near an event, times against the event's due time.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
-pub struct AroundRow {
+pub struct NearbyCycle {
     /// The rig's cycle.
     pub cycle: u64,
     /// Due, us from the event's due time.

@@ -4,7 +4,7 @@ use super::files::RunFiles;
 use super::made_up;
 use super::model::{Cause, Report, Source};
 use super::samples::Samples;
-use super::{ReportWithSources, choice, from_files, hlog, make, output};
+use super::{ReportWithSources, choice, from_files, hlog, make_report, output};
 use std::path::Path;
 
 pub(super) fn report_of(runs: Vec<RunFiles>) -> Report {
@@ -12,7 +12,7 @@ pub(super) fn report_of(runs: Vec<RunFiles>) -> Report {
 }
 
 fn made_in(folder: &Path) -> ReportWithSources {
-    make(&choice::choose(&[folder.into()], &[]).unwrap(), Some("Test"), true)
+    make_report(&choice::select_runs(&[folder.into()], &[]).unwrap(), Some("Test"), true)
 }
 
 #[test]

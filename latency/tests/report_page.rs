@@ -103,27 +103,27 @@ fn the_page_of_a_rich_report_holds_everything() {
     assert!(part("worst").contains("-overrun, with frames 301 of 110, 299 of 120."));
     assert!(part("worst").contains("The rig noted: Cycle 17: stale drive"));
     assert!(part("arrivals").contains("DriveValveCommand"));
-    for said in ["frames_malformed", "Run 4 lacks", "no probe.csv"] {
-        assert!(part("runs").contains(said), "{said}");
+    for words in ["frames_malformed", "Run 4 lacks", "no probe.csv"] {
+        assert!(part("runs").contains(words), "{words}");
     }
-    for said in ["beyond", "within", "too few runs to tell", "+100.0 %", "−2.0 %"] {
-        assert!(part("comparison").contains(said), "{said}");
+    for words in ["beyond", "within", "too few runs to tell", "+100.0 %", "−2.0 %"] {
+        assert!(part("comparison").contains(words), "{words}");
     }
-    for said in [
+    for words in [
         "✓ kept",
         "✗ broken",
         "not measured",
         "? not resolved: about 12000 pairs would resolve it",
         "? not resolved: the median is on the bound",
     ] {
-        assert!(part("bounds").contains(said), "{said}");
+        assert!(part("bounds").contains(words), "{words}");
     }
     for fact in report.conditions.machine.iter().chain(&report.conditions.command_lines) {
         assert!(part("conditions").contains(&fact.value), "{}", fact.name);
     }
     assert!(part("conditions").contains("cyclictest --mlockall"));
-    report.claim.not_controlled.iter().for_each(|said| assert!(part("not-controlled").contains(said)));
-    report.claim.reasons.iter().for_each(|said| assert!(html.contains(said)));
+    report.claim.not_controlled.iter().for_each(|words| assert!(part("not-controlled").contains(words)));
+    report.claim.reasons.iter().for_each(|words| assert!(html.contains(words)));
     assert!(html.contains("✗ Latency claim: not supported"));
     assert!(html.contains("airbench-latency-report, version 1"));
 }
@@ -148,10 +148,10 @@ fn every_drawing_has_its_text() {
 fn the_page_of_an_empty_report_says_that_nothing_was_measured() {
     let html = page(&sample::empty());
     check(&html);
-    for said in
+    for words in
         ["No length of time was measured.", "No reference was", "None was measured.", "No run was given."]
     {
-        assert!(html.to_lowercase().contains(&said.to_lowercase()), "{said}");
+        assert!(html.to_lowercase().contains(&words.to_lowercase()), "{words}");
     }
     assert!(!html.contains("<table>\n<thead><tr></tr>"));
     assert!(html.contains("0 runs of 0 s together. Made at an unknown time."));
@@ -210,7 +210,7 @@ fn odd_numbers_break_no_chart() {
     for event in &mut report.worst {
         event.at_s = f64::NAN;
         event.late_ns = u64::MAX;
-        for row in event.around.values_mut().flatten() {
+        for row in event.nearby_cycles.values_mut().flatten() {
             (row.late_us, row.run_delay_us) = (f64::INFINITY, f64::NAN);
         }
         event.probe.iter_mut().for_each(|gap| gap.length_us = f64::NAN);

@@ -10,35 +10,35 @@ use std::time::{Duration, Instant};
 
 /// Time between two attempts to connect.
 const RETRY_PERIOD: Duration = Duration::from_millis(100);
-/// Bytes taken in one turn: more than the emulator sends in 100 ms.
-const READ_A_TURN: usize = 256 << 10;
+/// Bytes read in one poll: more than the emulator sends in 100 ms.
+const BYTES_PER_POLL: usize = 256 << 10;
 
-pub(super) struct Feed {
+pub(super) struct TelemetryClient {
     path: PathBuf,
     stream: Option<UnixStream>,
     decoder: Decoder,
     next_attempt: Instant,
-    half_a_line: bool,
+    partial_line_sent: bool,
     bytes: Vec<u8>,
 }
 
-impl Feed {
-    /// A feed from the emulator's socket at `path`; the first turn connects.
+impl TelemetryClient {
+    /// A client of the emulator's socket at `path`; the first poll connects.
     pub(super) fn new(path: PathBuf) -> Self {
         Self {
             path,
             stream: None,
             decoder: Decoder::default(),
             next_attempt: Instant::now(),
-            half_a_line: false,
-            bytes: vec![0; READ_A_TURN],
+            partial_line_sent: false,
+            bytes: vec![0; BYTES_PER_POLL],
         }
     }
 
     /// Passes on what was received, and connects when an attempt is due. Returns whether the connection has ended because the
     /// emulator ended or restarted.
-    pub(super) fn turn(&mut self, mut take: impl FnMut(Packet)) -> bool {
-        if std::mem::take(&mut self.half_a_line) {
+    pub(super) fn poll(&mut self, mut take: impl FnMut(Packet)) -> bool {
+        if std::mem::take(&mut self.partial_line_sent) {
             return self.disconnect();
         }
         let Some(stream) = &mut self.stream else {
@@ -70,7 +70,7 @@ impl Feed {
             Ok(written) if written > line.len() => true,
             // Part of a line would corrupt the next one, so the connection is closed; a new one begins without input.
             Ok(_) => {
-                self.half_a_line = true;
+                self.partial_line_sent = true;
                 false
             }
             // A full socket belongs to an emulator that does not run.

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// The files of the run that the rules need.
 #[derive(Debug, Default)]
-pub(crate) struct Light {
+pub(crate) struct ClaimMonitor {
     folder: Option<PathBuf>,
     run: RunFiles,
 }
@@ -34,7 +34,7 @@ pub(crate) enum Support {
     Doubtful,
 }
 
-impl Light {
+impl ClaimMonitor {
     /// For the run in this folder.
     pub(crate) fn new(folder: Option<&Path>) -> Self {
         Self { folder: folder.map(Path::to_path_buf), run: RunFiles::default() }
@@ -49,13 +49,13 @@ impl Light {
             return Judgement { supported: Support::Doubtful, reasons: vec![reason.to_owned()] };
         }
         let conditions = conditions(std::slice::from_ref(&self.run));
-        let so_far = claim::so_far(&self.run, &conditions, CycleCount { cycles, skipped });
-        let supported = match (so_far.against.is_empty(), so_far.missing.is_empty()) {
+        let interim = claim::interim_claim(&self.run, &conditions, CycleCount { cycles, skipped });
+        let supported = match (interim.against.is_empty(), interim.missing.is_empty()) {
             (false, _) => Support::No,
             (true, false) => Support::Doubtful,
             (true, true) => Support::Yes,
         };
-        let reasons = [so_far.against, so_far.missing].concat();
+        let reasons = [interim.against, interim.missing].concat();
         Judgement { supported, reasons }
     }
 }
@@ -68,7 +68,7 @@ mod tests {
     fn judged(run: &Value, skipped: u64) -> Judgement {
         let folder = tempfile::tempdir().unwrap();
         std::fs::write(folder.path().join("run.json"), run.to_string()).unwrap();
-        Light::new(Some(folder.path())).judge(10_000, skipped)
+        ClaimMonitor::new(Some(folder.path())).judge(10_000, skipped)
     }
 
     #[test]
@@ -81,6 +81,6 @@ mod tests {
         assert_eq!(missed.supported, Support::No);
         assert!(missed.reasons[0].contains("missed 0.1 %"), "{missed:?}");
         assert_eq!(judged(&json!({ "realtime_granted": [] }), 0).supported, Support::No);
-        assert_eq!(Light::new(None).judge(1, 0).supported, Support::Doubtful);
+        assert_eq!(ClaimMonitor::new(None).judge(1, 0).supported, Support::Doubtful);
     }
 }

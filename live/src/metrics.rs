@@ -3,12 +3,12 @@
 use super::columns::COLUMNS;
 use super::light::Support;
 use super::state::State;
-use super::view::{Audience, View};
+use super::view::{ServerStatus, View};
 use std::fmt::{Display, Write as _};
 
 /// The text of `/metrics`.
-pub(crate) fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
-    let state = view.state(audience);
+pub(crate) fn text(view: &View, server_status: ServerStatus, bus_is_up: bool) -> String {
+    let state = view.state(server_status);
     let mut text = String::new();
     let mut one = |name: &str, kind: &str, help: &str, value: Option<f64>| {
         // Unknown values have no line.
@@ -59,7 +59,7 @@ pub(crate) fn text(view: &View, audience: Audience, bus_is_up: bool) -> String {
     for (frame, count) in view.wire.totals() {
         let _ = writeln!(text, "airbench_frames_total{{frame=\"{frame}\"}} {count}");
     }
-    for (name, samples) in view.rhythm.samples() {
+    for (name, samples) in view.latencies.samples() {
         head(&mut text, format!("{name}_seconds"), "summary", "Latency since this program looks on.");
         let reported = samples.percentiles_ns();
         for (quantile, ns) in
@@ -92,7 +92,7 @@ mod tests {
     fn a_quantile_that_too_few_samples_cannot_tell_has_no_line() {
         let mut view = View::new(None);
         let quantiles = |view: &View| {
-            let text = text(view, Audience::default(), true);
+            let text = text(view, ServerStatus::default(), true);
             text.lines().filter(|line| line.contains("wake_up_seconds{quantile=")).count()
         };
         assert_eq!(quantiles(&view), 0, "nothing was measured, and nothing took 0 s");

@@ -29,17 +29,17 @@ pub(crate) struct LatencyHistograms {
 impl LatencyHistograms {
     /// Adds a line of an interval log.
     pub(crate) fn take(&mut self, line: &str) -> Result<(), hlog::LogError> {
-        hlog::each(&format!("{line}\n"), |passing| {
-            let known = SHOWN.iter().position(|(_, tags)| tags.contains(&passing.tag));
+        hlog::each(&format!("{line}\n"), |interval| {
+            let known = SHOWN.iter().position(|(_, tags)| tags.contains(&interval.tag));
             let Some(distribution) = known.map(|place| &mut self.distributions[place]) else { return };
-            distribution.whole.add_histogram(passing.histogram);
-            let second = passing.start_s as u64;
+            distribution.whole.add_histogram(interval.histogram);
+            let second = interval.start_s as u64;
             let recent = &mut distribution.recent;
             if recent.back().is_none_or(|(newest, _)| *newest != second) {
                 push_newest(recent, RECENT_S, (second, Samples::default()));
             }
             if let Some((_, samples)) = recent.back_mut() {
-                samples.add_histogram(passing.histogram);
+                samples.add_histogram(interval.histogram);
             }
         })
     }

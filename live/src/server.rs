@@ -5,10 +5,10 @@ use super::assets;
 use super::cli::WatchArguments;
 use super::client::{Client, refusal, wait};
 use super::control::{self, Order};
-use super::feed::Feed;
+use super::feed::TelemetryClient;
 use super::http::{self, HEARTBEAT, Request, Status, is_ours, json_response, message_response, response};
 use super::metrics;
-use super::view::{Audience, View};
+use super::view::{ServerStatus, View};
 use super::wire::CONSOLE;
 use crate::wall_clock_ns;
 use crossbeam_channel::{Receiver, Sender, bounded};
@@ -49,7 +49,7 @@ pub(super) struct Server {
     bus: Box<dyn Bus>,
     url: BusUrl,
     bus_was_up: bool,
-    feed: Option<Feed>,
+    telemetry_client: Option<TelemetryClient>,
     view: View,
     listener: TcpListener,
     address: SocketAddr,
@@ -67,12 +67,12 @@ pub(super) struct Server {
     stop_due_ms: Option<u64>,
     missed_by_gone: u64,
     began: Instant,
-    due: Due,
+    due: DueTimes,
 }
 
 /// When the next events are due, ms.
 #[derive(Default)]
-struct Due {
+struct DueTimes {
     turn: u64,
     rows: u64,
     state: u64,
@@ -92,7 +92,7 @@ impl Server {
             bus_was_up: bus.is_up(),
             bus,
             url: arguments.bus.clone(),
-            feed: arguments.telemetry.clone().map(Feed::new),
+            telemetry_client: arguments.telemetry.clone().map(TelemetryClient::new),
             view: View::new(arguments.run.as_deref()),
             address: listener.local_addr().map_err(refused)?,
             listener,
@@ -107,7 +107,7 @@ impl Server {
             stop_due_ms: None,
             missed_by_gone: 0,
             began: Instant::now(),
-            due: Due::default(),
+            due: DueTimes::default(),
         })
     }
 
@@ -183,10 +183,10 @@ impl Server {
         if std::mem::replace(&mut self.bus_was_up, bus_is_up) != bus_is_up {
             self.announce_status(now_ms);
         }
-        let Some(feed) = &mut self.feed else { return };
+        let Some(telemetry_client) = &mut self.telemetry_client else { return };
         let (had_telemetry, mut described) = (self.view.telemetry, false);
         let (view, mut answers) = (&mut self.view, Vec::new());
-        let gone = feed.turn(|packet| match packet {
+        let gone = telemetry_client.poll(|packet| match packet {
             Packet::Answer(text) => answers.push(text),
             packet => {
                 described |= matches!(packet, Packet::Description(_));
@@ -238,11 +238,11 @@ impl Server {
         }
         if is_due(&mut self.due.second, now_ms, SECOND_MS) {
             self.view.wire.turn(now_ms);
-            self.view.second();
-            self.broadcast("histograms", &self.view.rhythm.histograms(), now_ms);
+            self.view.update_each_second();
+            self.broadcast("histograms", &self.view.latencies.histograms(), now_ms);
         }
         if is_due(&mut self.due.state, now_ms, STATE_MS) {
-            self.broadcast("state", &json!(self.view.state(self.audience(now_ms))), now_ms);
+            self.broadcast("state", &json!(self.view.state(self.server_status(now_ms))), now_ms);
         }
         if is_due(&mut self.due.heartbeat, now_ms, HEARTBEAT_MS) {
             self.offer(&HEARTBEAT.into(), now_ms);
@@ -280,10 +280,10 @@ impl Server {
         listeners.for_each(|client| client.offer(event, now_ms));
     }
 
-    fn audience(&self, now_ms: u64) -> Audience {
+    fn server_status(&self, now_ms: u64) -> ServerStatus {
         let missed: u64 = self.clients.iter().map(|client| client.missed).sum();
         let viewers = self.clients.iter().filter(|client| client.is_streaming()).count();
-        Audience { viewers, missed: self.missed_by_gone + missed, now_ms }
+        ServerStatus { viewers, missed: self.missed_by_gone + missed, now_ms }
     }
 
     /// Answers a request, or leaves the answer for later.
@@ -312,11 +312,11 @@ impl Server {
             }
             "/api/description" => json_response(Status::Good, &self.view.description(self.token.is_some())),
             "/api/state" => {
-                json_response(Status::Good, &json!(self.view.state_with_messages(self.audience(now_ms))))
+                json_response(Status::Good, &json!(self.view.state_with_messages(self.server_status(now_ms))))
             }
             "/api/history" => self.history(&request.query),
             "/metrics" => {
-                let text = metrics::text(&self.view, self.audience(now_ms), self.bus.is_up());
+                let text = metrics::text(&self.view, self.server_status(now_ms), self.bus.is_up());
                 response(Status::Good, "text/plain; version=0.0.4; charset=utf-8", text.as_bytes())
             }
             path => match assets::find(path) {
@@ -376,7 +376,11 @@ impl Server {
                 })
             }
             Order::Line(line) => {
-                if self.feed.as_mut().is_some_and(|feed| feed.command(&line)) {
+                if self
+                    .telemetry_client
+                    .as_mut()
+                    .is_some_and(|telemetry_client| telemetry_client.command(&line))
+                {
                     self.asked.push_back(number);
                     return None;
                 }
@@ -396,7 +400,7 @@ impl Server {
         match self.bus.send(&encoded) {
             Ok(_) => {
                 // A peer does not receive its frames.
-                self.view.minute.frame(FrameRecord { stamp_ns: wall_clock_ns(0), frame: encoded });
+                self.view.recent_record.frame(FrameRecord { stamp_ns: wall_clock_ns(0), frame: encoded });
                 if let Frame::ConsoleEmergencyStop(stop) = frame {
                     self.view.wire.note_stop(CONSOLE, *stop, now_ms);
                 }
@@ -426,7 +430,7 @@ impl Server {
             return Some(message_response(Status::Busy, "a record is being saved already"));
         }
         let interface = self.url.name().unwrap_or_else(|| NAMELESS.into());
-        let record = self.view.minute.last(seconds, &folder, &interface, self.view.set_up);
+        let record = self.view.recent_record.last(seconds, &folder, &interface, self.view.set_up);
         let done = self.saved.0.clone();
         // In a thread, since the disk may be slow.
         std::thread::spawn(move || done.send((number, record.write())));

@@ -2,7 +2,7 @@
 
 use super::chains;
 use super::columns::{COLUMNS, Column, Layout, MEASURED_COUNT, Source};
-use super::light::{Judgement, Light};
+use super::light::{ClaimMonitor, Judgement};
 use super::minute::RecentRecord;
 use super::rhythm::LatencyHistograms;
 use super::rows::{Rows, SPACING_CYCLES};
@@ -36,9 +36,9 @@ pub(crate) struct View {
     cycle: Option<u64>,
     pub wire: Wire,
     pub rows: Rows,
-    pub rhythm: LatencyHistograms,
-    pub minute: RecentRecord,
-    light: Light,
+    pub latencies: LatencyHistograms,
+    pub recent_record: RecentRecord,
+    claim_monitor: ClaimMonitor,
     claim: Option<Judgement>,
     overruns: u64,
     recent_overruns: VecDeque<u64>,
@@ -49,12 +49,12 @@ pub(crate) struct View {
     /// Set-up of the rig in the newest cycle, from the telemetry.
     pub set_up: SetUp,
     messages: VecDeque<Message>,
-    fresh: Vec<Message>,
+    unsent_messages: Vec<Message>,
 }
 
-/// Server-side numbers of the state.
+/// Numbers of the state that only the server has.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Audience {
+pub(crate) struct ServerStatus {
     /// Number of subscribers to events.
     pub viewers: usize,
     pub missed: u64,
@@ -65,7 +65,11 @@ pub(crate) struct Audience {
 impl View {
     /// A view before the first frame and packet; `folder` is the run's, if it is known.
     pub(crate) fn new(folder: Option<&Path>) -> Self {
-        Self { folder: folder.map(Path::to_path_buf), light: Light::new(folder), ..Self::default() }
+        Self {
+            folder: folder.map(Path::to_path_buf),
+            claim_monitor: ClaimMonitor::new(folder),
+            ..Self::default()
+        }
     }
 
     /// Processes a packet of the telemetry; answers go to the server instead.
@@ -78,7 +82,7 @@ impl View {
                 Err(error) => self.warn(&format!("an event of the telemetry cannot be read: {error}")),
             },
             Packet::Histogram(line) => {
-                if let Err(error) = self.rhythm.take(&line) {
+                if let Err(error) = self.latencies.take(&line) {
                     self.warn(&format!("a histogram of the telemetry cannot be read: {error}"));
                 }
             }
@@ -101,7 +105,7 @@ impl View {
         let named = known.columns.iter().map(|column| (column.table, column.name.as_str()));
         *self = Self {
             layout: Layout::new(named),
-            light: Light::new(folder.as_deref()),
+            claim_monitor: ClaimMonitor::new(folder.as_deref()),
             set_up: known.setup,
             overruns: known.dropped_events.overruns,
             skipped: known.dropped_events.skipped,
@@ -118,7 +122,7 @@ impl View {
     fn take_cycle(&mut self, cycle: u64, values: &[f64]) {
         self.cycle = Some(cycle);
         let measured = self.layout.measured(values);
-        self.minute.cycle(cycle, measured);
+        self.recent_record.cycle(cycle, measured);
         if !cycle.is_multiple_of(SPACING_CYCLES) {
             return;
         }
@@ -140,7 +144,7 @@ impl View {
     }
 
     pub(crate) fn frame(&mut self, record: FrameRecord, now_ms: u64) {
-        self.minute.frame(record);
+        self.recent_record.frame(record);
         match self.wire.take(&record.frame, now_ms) {
             Some(WireEvent::ChainValues(axis, cycle, values)) => {
                 self.rows.add_chain_values(axis, cycle, values)
@@ -182,40 +186,40 @@ impl View {
             }
             _ => {}
         }
-        self.say(cycle, level, &text, !is_skip || self.overruns <= OVERRUNS_KEPT);
+        self.add_message(cycle, level, &text, !is_skip || self.overruns <= OVERRUNS_KEPT);
     }
 
     fn change(&mut self, cycle: u64, set_up: SetUp) {
         if set_up != self.set_up {
             self.set_up = set_up;
-            self.minute.change(cycle);
+            self.recent_record.change(cycle);
         }
     }
 
     /// A warning of the page itself, at the newest cycle.
     fn warn(&mut self, text: &str) {
-        self.say(self.cycle.unwrap_or_default(), Level::Warning, text, true);
+        self.add_message(self.cycle.unwrap_or_default(), Level::Warning, text, true);
     }
 
-    fn say(&mut self, cycle: u64, level: Level, text: &str, is_kept: bool) {
+    fn add_message(&mut self, cycle: u64, level: Level, text: &str, is_kept: bool) {
         let message = Message { t_s: cycle as f64 / 1000.0, level, text: text.to_owned() };
         if is_kept {
             push_newest(&mut self.messages, MESSAGES_KEPT, message.clone());
         }
-        self.fresh.push(message);
+        self.unsent_messages.push(message);
     }
 
     /// The messages since the last call.
     pub(crate) fn take_messages(&mut self) -> Vec<Message> {
-        std::mem::take(&mut self.fresh)
+        std::mem::take(&mut self.unsent_messages)
     }
 
     /// Updates that are due once a second.
-    pub(crate) fn second(&mut self) {
+    pub(crate) fn update_each_second(&mut self) {
         let newest = self.cycle.unwrap_or_default();
         self.recent_overruns
             .retain(|cycle| newest.saturating_sub(*cycle) < OVERRUN_SECONDS as u64 * SECOND_CYCLES);
-        self.claim = Some(self.light.judge(newest, self.skipped));
+        self.claim = Some(self.claim_monitor.judge(newest, self.skipped));
     }
 
     pub(crate) fn run_folder(&self) -> Option<PathBuf> {
@@ -258,36 +262,36 @@ impl View {
         })
     }
 
-    pub(crate) fn state(&self, audience: Audience) -> State {
+    pub(crate) fn state(&self, server_status: ServerStatus) -> State {
         let status = self.wire.status;
         State {
             cycle: self.cycle,
             t_s: self.cycle.map(|cycle| cycle as f64 / 1000.0),
             last: self.rows.newest(),
-            emergency_stop: self.wire.emergency_stop(audience.now_ms),
+            emergency_stop: self.wire.emergency_stop(server_status.now_ms),
             linked: status.map_or(self.set_up.linked, |status| status.linked),
             check_valves_shut: status.map(|status| status.check_valves_shut),
             weights_kg: self.set_up.added_mass_kg,
-            chains: self.wire.chains(audience.now_ms),
+            chains: self.wire.chains(server_status.now_ms),
             faults_active: self.faults.values().cloned().collect(),
             bus: self.wire.load(),
             timing: Timing {
-                percentiles: self.rhythm.percentiles(),
+                percentiles: self.latencies.percentiles(),
                 overruns: self.overruns,
                 overruns_by_second: self.overruns_by_second(),
                 skipped: self.skipped,
             },
             claim: self.claim.clone(),
-            viewers: audience.viewers,
-            dropped: audience.missed,
+            viewers: server_status.viewers,
+            dropped: server_status.missed,
             telemetry_records_lost: self.records_lost,
             messages: None,
         }
     }
 
     /// The state with the last messages, for a new client.
-    pub(crate) fn state_with_messages(&self, audience: Audience) -> State {
-        State { messages: Some(self.messages.iter().cloned().collect()), ..self.state(audience) }
+    pub(crate) fn state_with_messages(&self, server_status: ServerStatus) -> State {
+        State { messages: Some(self.messages.iter().cloned().collect()), ..self.state(server_status) }
     }
 }
 
@@ -357,7 +361,7 @@ mod tests {
     }
 
     fn state(view: &View) -> Value {
-        json!(view.state_with_messages(Audience::default()))
+        json!(view.state_with_messages(ServerStatus::default()))
     }
 
     #[test]

@@ -9,7 +9,7 @@ pub const NOT_MEASURED: &str = "–";
 const THOUSANDS: char = '\u{202f}';
 
 /// Digits before the point, in threes.
-fn in_threes(digits: &str) -> String {
+fn grouped_digits(digits: &str) -> String {
     let length = digits.len();
     let mut grouped = String::with_capacity(length + length / 3);
     for (place, digit) in digits.chars().enumerate() {
@@ -24,7 +24,7 @@ fn in_threes(digits: &str) -> String {
 /// Whole number with its thousands set apart.
 #[must_use]
 pub fn count(count: u64) -> String {
-    in_threes(&count.to_string())
+    grouped_digits(&count.to_string())
 }
 
 /// A number with this many digits behind the point; a dash when it is none.
@@ -38,7 +38,7 @@ pub fn decimal(value: f64, digits: usize) -> String {
     let is_zero = text.chars().all(|letter| letter == '0' || letter == '.');
     let sign = if value < 0.0 && !is_zero { "−" } else { "" };
     let point = if fraction.is_empty() { "" } else { "." };
-    format!("{sign}{}{point}{fraction}", in_threes(whole))
+    format!("{sign}{}{point}{fraction}", grouped_digits(whole))
 }
 
 /// A number of any size and unit on a page: whole with its thousands apart, or with four digits that count.
@@ -97,7 +97,7 @@ pub fn in_us(ns: u64) -> String {
 
 /// The same where nothing may have been measured.
 #[must_use]
-pub fn maybe_us(ns: Option<u64>) -> String {
+pub fn us_or_not_measured(ns: Option<u64>) -> String {
     ns.map_or_else(|| NOT_MEASURED.into(), in_us)
 }
 
@@ -165,7 +165,7 @@ mod tests {
     #[test]
     fn lengths_of_time_have_the_unit_that_suits_them() {
         assert_eq!(
-            (in_us(52), in_us(13_149), maybe_us(None)),
+            (in_us(52), in_us(13_149), us_or_not_measured(None)),
             ("0.05".into(), "13.1".into(), NOT_MEASURED.into())
         );
         let reported = [7, 13_149, 3_500_000, 2_000_000_000].map(length);

@@ -7,8 +7,8 @@ use crate::number;
 use crate::page::escaped;
 use std::fmt::Write as _;
 
-/// A place on the drawing, in its own pixels.
-pub type Place = (f64, f64);
+/// A point of the drawing, in its own pixels.
+pub type Point = (f64, f64);
 
 /// From values to pixels.
 #[derive(Clone, Copy, Debug)]
@@ -81,20 +81,20 @@ pub fn whole_decades(low: f64, high: f64) -> (f64, f64) {
     (low, high.max(10.0 * low))
 }
 
-/// How a curve looks, by its place among those of its chart.
+/// Style of a curve, by its index in its chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Look {
-    /// A distribution of airbench, with the colour of this place.
+pub enum CurveStyle {
+    /// A distribution of airbench, with the colour of this index.
     Ours(usize),
-    /// A distribution of a reference, with the look of this place.
+    /// A distribution of a reference, with the style of this index.
     Reference(usize),
 }
 
-/// Looks that differ by colour and dashes.
+/// Styles that differ by colour and dashes.
 const OURS: usize = 6;
 const REFERENCES: usize = 2;
 
-impl Look {
+impl CurveStyle {
     /// Its class in the stylesheet.
     pub fn class(self) -> String {
         match self {
@@ -104,11 +104,11 @@ impl Look {
     }
 
     /// Its marker at a place.
-    pub fn marker(self, place: Place, is_hollow: bool) -> String {
+    pub fn marker(self, place: Point, is_hollow: bool) -> String {
         let (x, y) = place;
         let hollow = if is_hollow { " hollow" } else { "" };
         let class = format!("class=\"marker{hollow} {}\"", self.class());
-        let polygon = |corners: &[Place]| {
+        let polygon = |corners: &[Point]| {
             let corners = corners.iter().map(|(dx, dy)| format!("{:.1},{:.1}", x + dx, y + dy));
             format!("<polygon {class} points=\"{}\"/>", corners.collect::<Vec<_>>().join(" "))
         };
@@ -128,7 +128,7 @@ impl Look {
 }
 
 /// A line through these places.
-pub fn line(class: &str, places: &[Place]) -> String {
+pub fn line(class: &str, places: &[Point]) -> String {
     let mut path = String::with_capacity(12 * places.len());
     for (place, (x, y)) in places.iter().enumerate() {
         let _ = write!(path, "{}{x:.1} {y:.1}", if place == 0 { 'M' } else { 'L' });
@@ -137,7 +137,7 @@ pub fn line(class: &str, places: &[Place]) -> String {
 }
 
 /// A straight line.
-pub fn stroke(class: &str, from: Place, to: Place) -> String {
+pub fn stroke(class: &str, from: Point, to: Point) -> String {
     format!(
         "<line class=\"{class}\" x1=\"{:.1}\" y1=\"{:.1}\" x2=\"{:.1}\" y2=\"{:.1}\"/>\n",
         from.0, from.1, to.0, to.1
@@ -145,12 +145,12 @@ pub fn stroke(class: &str, from: Place, to: Place) -> String {
 }
 
 /// Text at a place; the class says which end of it stands there.
-pub fn text(class: &str, place: Place, words: &str) -> String {
+pub fn text(class: &str, place: Point, words: &str) -> String {
     format!("<text class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\">{}</text>\n", place.0, place.1, escaped(words))
 }
 
 /// Rectangle between two corners; empty where they are the wrong way round.
-pub fn bar(class: &str, from: Place, to: Place) -> String {
+pub fn bar(class: &str, from: Point, to: Point) -> String {
     format!(
         "<rect class=\"{class}\" x=\"{:.1}\" y=\"{:.1}\" width=\"{:.1}\" height=\"{:.1}\"/>\n",
         from.0,
@@ -217,13 +217,13 @@ pub fn legend_entry(sample: &str, name: &str) -> String {
 }
 
 /// The piece of a legend that shows a curve.
-pub fn curve_sample(look: Look) -> String {
-    let area = match look {
-        Look::Reference(0) => bar("area", (1.0, 4.0), (37.0, 13.0)),
+pub fn curve_sample(style: CurveStyle) -> String {
+    let area = match style {
+        CurveStyle::Reference(0) => bar("area", (1.0, 4.0), (37.0, 13.0)),
         _ => String::new(),
     };
-    let line = line(&format!("line {}", look.class()), &[(1.0, 7.0), (37.0, 7.0)]);
-    format!("{area}{line}{}", look.marker((19.0, 7.0), false))
+    let line = line(&format!("line {}", style.class()), &[(1.0, 7.0), (37.0, 7.0)]);
+    format!("{area}{line}{}", style.marker((19.0, 7.0), false))
 }
 
 #[cfg(test)]

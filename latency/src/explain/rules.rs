@@ -69,34 +69,35 @@ pub(crate) struct Explanation {
     pub evidence: Vec<String>,
 }
 
-pub(crate) fn cause(seen: &LatenessEvidence) -> Explanation {
-    let cause = first_that_holds(seen);
-    Explanation { cause, sentence: sentence(cause, seen), evidence: evidence(seen) }
+pub(crate) fn cause(lateness: &LatenessEvidence) -> Explanation {
+    let cause = first_that_holds(lateness);
+    Explanation { cause, sentence: sentence(cause, lateness), evidence: evidence(lateness) }
 }
 
-fn first_that_holds(seen: &LatenessEvidence) -> Cause {
-    let bad_ns = seen.bad_ns();
-    let waited = seen.waited_half();
-    let slow = seen.slow_ns > seen.late_ns;
-    if seen.continued > 0 {
-        return if seen.process == EMULATOR { Cause::EmulatorStopped } else { Cause::ControllerStopped };
+fn first_that_holds(lateness: &LatenessEvidence) -> Cause {
+    let bad_ns = lateness.bad_ns();
+    let waited = lateness.waited_half();
+    let slow = lateness.slow_ns > lateness.late_ns;
+    if lateness.continued > 0 {
+        return if lateness.process == EMULATOR { Cause::EmulatorStopped } else { Cause::ControllerStopped };
     }
-    if seen.still_ns.saturating_mul(2) >= bad_ns {
+    if lateness.still_ns.saturating_mul(2) >= bad_ns {
         return Cause::MachineStoodStill;
     }
     if waited {
-        return if seen.other_stood_still() { Cause::MachineStoodStill } else { Cause::CpuContention };
+        return if lateness.other_stood_still() { Cause::MachineStoodStill } else { Cause::CpuContention };
     }
-    if seen.faults() > MANY_FAULTS || seen.fault_cost_ns().saturating_mul(3) >= bad_ns {
+    if lateness.faults() > MANY_FAULTS || lateness.fault_cost_ns().saturating_mul(3) >= bad_ns {
         return Cause::PageFaults;
     }
     if slow {
-        let elsewhere = seen.still_elsewhere_ns.saturating_mul(2) >= bad_ns || seen.other_stood_still();
+        let elsewhere =
+            lateness.still_elsewhere_ns.saturating_mul(2) >= bad_ns || lateness.other_stood_still();
         return if elsewhere { Cause::MachineStoodStill } else { Cause::Unexplained };
     }
-    let cpu_was_free = seen.probe_watched == ProbeCoverage::Watched
-        && seen.still_ns.max(seen.another_ns).saturating_mul(4) < bad_ns;
-    if cpu_was_free || !seen.knows_run_delay {
+    let cpu_was_free = lateness.probe_watched == ProbeCoverage::Watched
+        && lateness.still_ns.max(lateness.another_ns).saturating_mul(4) < bad_ns;
+    if cpu_was_free || !lateness.knows_run_delay {
         return Cause::Unexplained;
     }
     Cause::MachineStoodStill
@@ -149,12 +150,12 @@ pub(crate) fn in_words(ns: u64) -> String {
     }
 }
 
-fn sentence(cause: Cause, seen: &LatenessEvidence) -> String {
-    let LatenessEvidence { process, missed, vitals, .. } = seen;
-    let what = if seen.slow_ns > seen.late_ns {
-        format!("The {process} was {} slower than usual", in_words(seen.slow_ns))
+fn sentence(cause: Cause, lateness: &LatenessEvidence) -> String {
+    let LatenessEvidence { process, missed, vitals, .. } = lateness;
+    let what = if lateness.slow_ns > lateness.late_ns {
+        format!("The {process} was {} slower than usual", in_words(lateness.slow_ns))
     } else {
-        format!("The {process} woke {} late", in_words(seen.late_ns))
+        format!("The {process} woke {} late", in_words(lateness.late_ns))
     };
     let and_missed = match missed {
         0 => String::new(),
@@ -169,19 +170,19 @@ fn sentence(cause: Cause, seen: &LatenessEvidence) -> String {
         Cause::CpuContention => format!(
             "because other threads had CPU {cpu} for {}: to a FIFO thread only threads of the same or a higher priority, \
              interrupts and the kernel's stop threads can do that",
-            in_words(seen.waited_ns)
+            in_words(lateness.waited_ns)
         ),
         Cause::PageFaults => {
-            format!("because it had to wait for pages: {} faults in one cycle", seen.faults())
+            format!("because it had to wait for pages: {} faults in one cycle", lateness.faults())
         }
-        Cause::MachineStoodStill if seen.still_ns.saturating_mul(2) >= seen.bad_ns() => format!(
+        Cause::MachineStoodStill if lateness.still_ns.saturating_mul(2) >= lateness.bad_ns() => format!(
             "because the machine stood still: for {} no thread ran on CPU {cpu}, which the probe saw",
-            in_words(seen.still_ns)
+            in_words(lateness.still_ns)
         ),
-        Cause::MachineStoodStill if seen.other_stood_still() || seen.still_elsewhere_ns > 0 => {
-            let waited = in_words(seen.waited_ns);
+        Cause::MachineStoodStill if lateness.other_stood_still() || lateness.still_elsewhere_ns > 0 => {
+            let waited = in_words(lateness.waited_ns);
             // The kernel's account and the other witness contradict each other: a waiting thread has a CPU that runs.
-            let (likely, although) = if seen.waited_half() {
+            let (likely, although) = if lateness.waited_half() {
                 (
                     "most likely ",
                     format!(
@@ -198,14 +199,14 @@ fn sentence(cause: Cause, seen: &LatenessEvidence) -> String {
         Cause::MachineStoodStill => format!(
             "most likely because the machine stood still: it waited only {} of {} for CPU {cpu}, had {} page faults and was \
              not stopped, so that the timer's interrupt itself came late",
-            in_words(seen.waited_ns),
-            in_words(seen.together_ns),
-            if seen.faults() == 0 { "no".to_owned() } else { seen.faults().to_string() }
+            in_words(lateness.waited_ns),
+            in_words(lateness.together_ns),
+            if lateness.faults() == 0 { "no".to_owned() } else { lateness.faults().to_string() }
         ),
-        _ if seen.probe_watched == ProbeCoverage::Watched && seen.slow_ns <= seen.late_ns => {
+        _ if lateness.probe_watched == ProbeCoverage::Watched && lateness.slow_ns <= lateness.late_ns => {
             format!("and nothing explains it: the probe saw CPU {cpu} free in that time")
         }
-        _ if seen.slow_ns > seen.late_ns => {
+        _ if lateness.slow_ns > lateness.late_ns => {
             "and nothing that was recorded tells whether its work was longer or the CPU stood still under it"
                 .to_owned()
         }
@@ -214,14 +215,14 @@ fn sentence(cause: Cause, seen: &LatenessEvidence) -> String {
     format!("{what}{and_missed}, {because}.")
 }
 
-fn evidence(seen: &LatenessEvidence) -> Vec<String> {
-    let LatenessEvidence { vitals, .. } = seen;
+fn evidence(lateness: &LatenessEvidence) -> Vec<String> {
+    let LatenessEvidence { vitals, .. } = lateness;
     let mut reported = Vec::new();
-    if seen.continued > 0 {
-        reported.push(format!("SIGCONT was counted {} time(s) in these cycles.", seen.continued));
+    if lateness.continued > 0 {
+        reported.push(format!("SIGCONT was counted {} time(s) in these cycles.", lateness.continued));
     }
-    reported.push(if seen.knows_run_delay {
-        format!("It was ready and waited for the CPU for {}.", in_words(seen.waited_ns))
+    reported.push(if lateness.knows_run_delay {
+        format!("It was ready and waited for the CPU for {}.", in_words(lateness.waited_ns))
     } else {
         "The kernel does not tell how long threads wait for a CPU.".to_owned()
     });
@@ -239,41 +240,44 @@ fn evidence(seen: &LatenessEvidence) -> Vec<String> {
             "It gave the CPU away {switches} times; once a cycle is usual, so its own work blocked."
         ));
     }
-    if seen.slow_ns > seen.late_ns {
-        let [receive, step, send] = seen.stages_ns.map(in_words);
+    if lateness.slow_ns > lateness.late_ns {
+        let [receive, step, send] = lateness.stages_ns.map(in_words);
         reported.push(format!("Stages of that cycle: receive {receive}, step {step}, send {send}."));
     }
-    for (other, bad_ns, waited_ns) in &seen.others {
+    for (other, bad_ns, waited_ns) in &lateness.others {
         let (bad, waited) = (in_words(*bad_ns), in_words(*waited_ns));
         reported.push(format!(
             "In the same moment {other} was late or slow by {bad}, of which it waited {waited} for a CPU."
         ));
     }
-    reported.push(probe_evidence(seen));
+    reported.push(probe_evidence(lateness));
     reported
 }
 
-fn probe_evidence(seen: &LatenessEvidence) -> String {
-    let cpu = seen.vitals.cpu;
-    let mut text = if seen.probe_watched == ProbeCoverage::Unwatched {
+fn probe_evidence(lateness: &LatenessEvidence) -> String {
+    let cpu = lateness.vitals.cpu;
+    let mut text = if lateness.probe_watched == ProbeCoverage::Unwatched {
         format!("No probe watched CPU {cpu}: whether it stood still was not seen directly.")
-    } else if seen.probe_watched == ProbeCoverage::NotReported {
+    } else if lateness.probe_watched == ProbeCoverage::NotReported {
         format!("The probe's table has no gap of CPU {cpu}, and does not tell whether that CPU was watched.")
-    } else if seen.still_ns > 0 {
+    } else if lateness.still_ns > 0 {
         format!(
             "The probe saw CPU {cpu} stand still for {} of it, no other thread running.",
-            in_words(seen.still_ns)
+            in_words(lateness.still_ns)
         )
-    } else if seen.another_ns > 0 {
+    } else if lateness.another_ns > 0 {
         format!(
             "The probe was kept from CPU {cpu} by another thread for {} of it.",
-            in_words(seen.another_ns)
+            in_words(lateness.another_ns)
         )
     } else {
         format!("The probe on CPU {cpu} saw no gap in that time.")
     };
-    if seen.still_elsewhere_ns > 0 {
-        text.push_str(&format!(" Another CPU stood still for {} of it.", in_words(seen.still_elsewhere_ns)));
+    if lateness.still_elsewhere_ns > 0 {
+        text.push_str(&format!(
+            " Another CPU stood still for {} of it.",
+            in_words(lateness.still_elsewhere_ns)
+        ));
     }
     text
 }

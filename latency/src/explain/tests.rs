@@ -29,8 +29,8 @@ fn a_stopped_rig_is_one_event_and_its_controller_is_not_late() {
     assert_eq!((event.cause, event.process.as_str()), (Cause::EmulatorStopped, "emulator"));
     assert_eq!((event.cycle, event.skipped, event.late_ns), (100, 5, 5_400_000));
     assert!(event.sentence.contains("5.40 ms late and missed 5 cycles"), "{}", event.sentence);
-    assert!(event.around["emulator"].iter().any(|row| row.cycle == 105));
-    assert!(event.around.contains_key("controller"));
+    assert!(event.nearby_cycles["emulator"].iter().any(|row| row.cycle == 105));
+    assert!(event.nearby_cycles.contains_key("controller"));
 }
 
 #[test]

@@ -20,12 +20,13 @@ pub(super) fn conditions(conditions: &Conditions) -> String {
     } else {
         "not running: whether the machine stood still is not known"
     };
-    let beside = [fact("load generator", load), fact("reference", &reference), fact("spin-gap probe", probe)];
+    let accompanying =
+        [fact("load generator", load), fact("reference", &reference), fact("spin-gap probe", probe)];
     [
         ("Machine, kernel, limits, build", conditions.machine.as_slice()),
         ("Command lines", &conditions.command_lines),
         ("Privileges", &conditions.privileges),
-        ("Beside the runs", &beside),
+        ("Beside the runs", &accompanying),
     ]
     .map(|(title, facts)| format!("<h3>{title}</h3>\n{}", table(title, facts)))
     .concat()

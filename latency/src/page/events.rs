@@ -2,7 +2,7 @@
 
 use super::timeline::{by_process, timeline};
 use crate::explain::EVENT_OVER_NS;
-use crate::model::{AroundRow, Cause, Event, Finding, Report};
+use crate::model::{Cause, Event, Finding, NearbyCycle, Report};
 use pagekit::markup::{Cell, Table, folded, list, none, number, words as text};
 use pagekit::number;
 use pagekit::page::escaped;
@@ -46,19 +46,19 @@ fn card(event: &Event, place: usize, is_probed: bool) -> String {
         "<article class=\"card\" aria-labelledby=\"event-{place}\">\n<h3 id=\"event-{place}\">{rank}. {}: {}</h3>\n\
          <p class=\"soft\">{}</p>\n<p><span class=\"tag\">{}</span> {}</p>\n{}{}{}{}</article>\n",
         escaped(&event.process),
-        what(event),
-        when(event),
+        lateness_text(event),
+        occurrence_text(event),
         cause(event.cause),
         escaped(&event.sentence),
         list(&event.evidence, "Nothing was recorded that speaks for or against it."),
-        beside(event),
+        recorded_beside(event),
         timeline(event, place, is_probed),
         rows(event, place),
     )
 }
 
-/// What the flight recorder and the rig noted beside it.
-fn beside(event: &Event) -> String {
+/// Records of the flight recorder and of the rig near the event.
+fn recorded_beside(event: &Event) -> String {
     let mut reported = Vec::new();
     if let Some(dump) = &event.dump {
         let frames: Vec<_> =
@@ -71,8 +71,8 @@ fn beside(event: &Event) -> String {
     if reported.is_empty() { String::new() } else { list(&reported, "") }
 }
 
-/// What happened, in figures.
-fn what(event: &Event) -> String {
+/// Lateness, slowness and missed cycles of an event.
+fn lateness_text(event: &Event) -> String {
     let mut parts = Vec::new();
     if event.late_ns > 0 {
         parts.push(format!("{} late", number::length(event.late_ns)));
@@ -86,7 +86,7 @@ fn what(event: &Event) -> String {
     if parts.is_empty() { "on time".into() } else { parts.join(", ") }
 }
 
-fn when(event: &Event) -> String {
+fn occurrence_text(event: &Event) -> String {
     format!(
         "Run {}, cycle {}, at {} s.",
         event.run,
@@ -97,7 +97,7 @@ fn when(event: &Event) -> String {
 
 /// Rows of all processes and the probe's gaps.
 fn rows(event: &Event, place: usize) -> String {
-    let total: usize = event.around.values().map(Vec::len).sum();
+    let total: usize = event.nearby_cycles.values().map(Vec::len).sum();
     if total + event.probe.len() == 0 {
         return String::new();
     }
@@ -116,10 +116,10 @@ fn rows(event: &Event, place: usize) -> String {
     let us = |value: f64| number(number::decimal(value, 1));
     let mut table = Table::new(label, head);
     let mut left_out = 0;
-    for (process, around) in by_process(event) {
-        let room = MOST_ROWS / event.around.len().max(1);
-        let shown = nearest(around, room);
-        left_out += around.len() - shown.len();
+    for (process, cycles) in by_process(event) {
+        let room = MOST_ROWS / event.nearby_cycles.len().max(1);
+        let shown = nearest(cycles, room);
+        left_out += cycles.len() - shown.len();
         for row in shown {
             let is_hit = process == event.process && row.cycle == event.cycle;
             table.marked_row(
@@ -163,7 +163,7 @@ fn rows(event: &Event, place: usize) -> String {
 }
 
 /// As many rows as there is room for, around the due time of the event.
-fn nearest(rows: &[AroundRow], room: usize) -> &[AroundRow] {
+fn nearest(rows: &[NearbyCycle], room: usize) -> &[NearbyCycle] {
     if rows.len() <= room {
         return rows;
     }
@@ -207,7 +207,7 @@ mod tests {
     fn the_rows_nearest_to_the_event_are_shown() {
         let row = |cycle: u64| {
             let due_us = cycle as f64 * 1000.0 - 5000.0;
-            AroundRow { cycle, due_us, ..AroundRow::default() }
+            NearbyCycle { cycle, due_us, ..NearbyCycle::default() }
         };
         let rows: Vec<_> = (0..20).map(row).collect();
         let cycles = |room| nearest(&rows, room).iter().map(|row| row.cycle).collect::<Vec<_>>();

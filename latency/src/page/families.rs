@@ -5,7 +5,7 @@
 
 use crate::files::EMULATOR;
 use crate::model::{Distribution, Source};
-use pagekit::svg::Look;
+use pagekit::svg::CurveStyle;
 
 /// Distributions that answer one question.
 pub(super) struct Family<'a> {
@@ -13,8 +13,8 @@ pub(super) struct Family<'a> {
     pub(super) title: String,
     /// What its numbers are, in a sentence.
     pub(super) about: &'static str,
-    /// The distributions with their looks, ours first.
-    pub(super) members: Vec<(Look, &'a Distribution)>,
+    /// The distributions with their styles, ours first.
+    pub(super) members: Vec<(CurveStyle, &'a Distribution)>,
 }
 
 /// Order, heading, meaning.
@@ -92,22 +92,23 @@ pub(super) fn families(distributions: &[Distribution]) -> Vec<Family<'_>> {
             found.push((format!("{title}: {name}"), about, own));
         }
     }
-    let with_looks = found.into_iter().filter(|(_, _, members)| !members.is_empty());
-    let families = with_looks.enumerate().map(|(place, (title, about, members))| Family {
+    let non_empty = found.into_iter().filter(|(_, _, members)| !members.is_empty());
+    let families = non_empty.enumerate().map(|(place, (title, about, members))| Family {
         identifier: format!("family-{place}"),
         title,
         about,
-        members: looks(members),
+        members: styles(members),
     });
     families.collect()
 }
 
-/// Each member with its look, ours first.
-fn looks(members: Vec<&Distribution>) -> Vec<(Look, &Distribution)> {
+/// Each member with its style, ours first.
+fn styles(members: Vec<&Distribution>) -> Vec<(CurveStyle, &Distribution)> {
     let (references, ours): (Vec<_>, Vec<_>) =
         members.into_iter().partition(|one| one.source == Source::Reference);
-    let ours = ours.into_iter().enumerate().map(|(place, one)| (Look::Ours(place), one));
-    let references = references.into_iter().enumerate().map(|(place, one)| (Look::Reference(place), one));
+    let ours = ours.into_iter().enumerate().map(|(place, one)| (CurveStyle::Ours(place), one));
+    let references =
+        references.into_iter().enumerate().map(|(place, one)| (CurveStyle::Reference(place), one));
     ours.chain(references).collect()
 }
 
@@ -135,11 +136,11 @@ mod tests {
         let reported: Vec<_> = families
             .iter()
             .map(|family| {
-                let members = family.members.iter().map(|(look, one)| (*look, one.name.as_str()));
+                let members = family.members.iter().map(|(style, one)| (*style, one.name.as_str()));
                 (family.title.as_str(), members.collect::<Vec<_>>())
             })
             .collect();
-        let (ours, reference) = (Look::Ours(0), Look::Reference(0));
+        let (ours, reference) = (CurveStyle::Ours(0), CurveStyle::Reference(0));
         assert_eq!(
             reported,
             [

@@ -6,10 +6,11 @@ use crate::model::{PercentilesNs, Ratio, Source};
 use crate::samples::PERCENTILES;
 use pagekit::markup::{Cell, Table, folded, none, number, paragraph, words as text};
 use pagekit::number::{self, NOT_MEASURED};
-use pagekit::svg::{Drawing, Look, Scale, stroke, text as label};
+use pagekit::svg::{CurveStyle, Drawing, Scale, stroke, text as label};
 
 pub(super) fn percentiles(of: &PercentilesNs) -> Vec<Cell> {
-    let lengths = [of.p50, of.p90, of.p99, of.p999, of.p9999, of.max].map(|ns| number(number::maybe_us(ns)));
+    let lengths =
+        [of.p50, of.p90, of.p99, of.p999, of.p9999, of.max].map(|ns| number(number::us_or_not_measured(ns)));
     lengths.into_iter().chain([number(number::count(of.count))]).collect()
 }
 
@@ -36,21 +37,22 @@ pub(super) fn ratios(ratios: &[Ratio]) -> String {
     let mut pairs =
         Table::new("Pairs in µs", ["ratio", "pair", "ours, µs", "reference, µs", "ours / reference"]);
     for ratio in ratios {
-        let interval = ratio
-            .interval
-            .map_or_else(|| NOT_MEASURED.into(), |(low, high)| format!("{} – {}", two(low), two(high)));
+        let interval = ratio.interval.map_or_else(
+            || NOT_MEASURED.into(),
+            |(low, high)| format!("{} – {}", two_decimals(low), two_decimals(high)),
+        );
         let confidence = ratio
             .confidence
             .map_or_else(|| NOT_MEASURED.into(), |share| format!("{} %", number::decimal(100.0 * share, 1)));
         table.row([
             text(&ratio.name),
-            number(two(ratio.median)),
+            number(two_decimals(ratio.median)),
             number(interval),
             number(confidence),
             number(number::count(ratio.pairs_ns.len() as u64)),
         ]);
         for (place, (ours, reference)) in ratio.pairs_ns.iter().enumerate() {
-            let quotient = quotient(*ours, *reference).map_or_else(|| NOT_MEASURED.into(), two);
+            let quotient = quotient(*ours, *reference).map_or_else(|| NOT_MEASURED.into(), two_decimals);
             pairs.row([
                 text(&ratio.name),
                 number((place + 1).to_string()),
@@ -64,10 +66,15 @@ pub(super) fn ratios(ratios: &[Ratio]) -> String {
                 diamond is the median, the bar its interval, which ranks give without assuming a distribution; fewer than six \
                 pairs give none. Left of 1 ours is the shorter.";
     let pairs = folded("Each pair", &pairs.html_or("No pair was measured."));
-    format!("{}{}{}{pairs}", paragraph(sentence), forest(ratios), table.html_or("No ratio was measured."))
+    format!(
+        "{}{}{}{pairs}",
+        paragraph(sentence),
+        forest_plot(ratios),
+        table.html_or("No ratio was measured.")
+    )
 }
 
-fn two(value: f64) -> String {
+fn two_decimals(value: f64) -> String {
     number::decimal(value, 2)
 }
 
@@ -82,7 +89,7 @@ const ROW: f64 = 30.0;
 const TOP: f64 = 14.0;
 
 /// Dots of the pairs, bar of the interval, diamond of the median; a row for each ratio.
-fn forest(ratios: &[Ratio]) -> String {
+fn forest_plot(ratios: &[Ratio]) -> String {
     let pairs =
         ratios.iter().flat_map(|ratio| &ratio.pairs_ns).filter_map(|(one, other)| quotient(*one, *other));
     let others = ratios.iter().flat_map(|ratio| {
@@ -100,7 +107,7 @@ fn forest(ratios: &[Ratio]) -> String {
         let y = TOP + ROW * (place as f64 + 0.5);
         drawn += &label("name end", (LEFT - 14.0, y + 4.5), &ratio.name);
         for pair in ratio.pairs_ns.iter().filter_map(|(ours, reference)| quotient(*ours, *reference)) {
-            drawn += &Look::Ours(0).marker((scale.at(pair), y), true);
+            drawn += &CurveStyle::Ours(0).marker((scale.at(pair), y), true);
         }
         if let Some((from, to)) = ratio.interval.filter(|(from, to)| from.is_finite() && to.is_finite()) {
             let (from, to) = (scale.at(from), scale.at(to));
@@ -109,7 +116,7 @@ fn forest(ratios: &[Ratio]) -> String {
             drawn += &stroke("edge", (to, y + 5.0), (to, y + 12.0));
         }
         if ratio.median.is_finite() {
-            drawn += &Look::Ours(3).marker((scale.at(ratio.median), y + 9.0), false);
+            drawn += &CurveStyle::Ours(3).marker((scale.at(ratio.median), y + 9.0), false);
         }
     }
     let drawing = Drawing {

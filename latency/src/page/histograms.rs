@@ -9,7 +9,8 @@ use pagekit::markup::none;
 use pagekit::number;
 use pagekit::page::escaped;
 use pagekit::svg::{
-    Drawing, Look, Place, Scale, curve_sample, legend_entry, line, stroke, text, time_axis, whole_decades,
+    CurveStyle, Drawing, Point, Scale, curve_sample, legend_entry, line, stroke, text, time_axis,
+    whole_decades,
 };
 
 /// Shorter lengths stand on the left end of the axis: below, it is the clock that is measured.
@@ -96,13 +97,13 @@ fn chart(family: &Family<'_>, size: &Size) -> String {
     }
     // The grey area lies behind, the first of ours in front.
     let (area, lines): (Vec<_>, Vec<_>) =
-        members.iter().copied().rev().partition(|(look, _)| *look == Look::Reference(0));
-    drawn.extend(area.into_iter().chain(lines).map(|(look, one)| curve(look, one, &x, &y)));
+        members.iter().copied().rev().partition(|(style, _)| *style == CurveStyle::Reference(0));
+    drawn.extend(area.into_iter().chain(lines).map(|(style, one)| curve(style, one, &x, &y)));
     let legend: String = members
         .iter()
-        .map(|(look, one)| {
+        .map(|(style, one)| {
             let samples = number::count(one.percentiles_ns.count);
-            legend_entry(&curve_sample(*look), &format!("{}, {samples} samples", one.shown_name()))
+            legend_entry(&curve_sample(*style), &format!("{}, {samples} samples", one.shown_name()))
         })
         .collect();
     let description = description(family);
@@ -137,24 +138,24 @@ fn upright_label(label: &str, across: (f64, f64)) -> String {
     )
 }
 
-fn curve(look: Look, distribution: &Distribution, x: &Scale, y: &Scale) -> String {
+fn curve(style: CurveStyle, distribution: &Distribution, x: &Scale, y: &Scale) -> String {
     let steps = steps(&distribution.bins, x, y);
-    let class = look.class();
-    let area = match look {
-        Look::Reference(0) => line("area", &steps),
+    let class = style.class();
+    let area = match style {
+        CurveStyle::Reference(0) => line("area", &steps),
         _ => String::new(),
     };
     let markers: String = marked(distribution)
         .into_iter()
-        .map(|(ns, count)| look.marker((x.at(ns), y.at(count)), false))
+        .map(|(ns, count)| style.marker((x.at(ns), y.at(count)), false))
         .collect();
     format!("{area}{}{markers}\n", line(&format!("line {class}"), &steps))
 }
 
 /// The outline of the bins, down to the axis where there is none.
-fn steps(bins: &[Bin], x: &Scale, y: &Scale) -> Vec<Place> {
+fn steps(bins: &[Bin], x: &Scale, y: &Scale) -> Vec<Point> {
     let base = y.at(NO_SAMPLE);
-    let mut steps: Vec<Place> = Vec::with_capacity(2 * bins.len() + 2);
+    let mut steps: Vec<Point> = Vec::with_capacity(2 * bins.len() + 2);
     let mut end_ns = None;
     for bin in bins {
         let (from, to, height) = (x.at(bin.from_ns as f64), x.at(bin.to_ns as f64), y.at(bin.count as f64));

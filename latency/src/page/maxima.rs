@@ -7,7 +7,7 @@ use super::families::Family;
 use super::histograms::{FOOT, LEFT, RIGHT, Size, charts, figure};
 use crate::model::{Distribution, Maximum, Report};
 use pagekit::number;
-use pagekit::svg::{Drawing, Look, Place, Scale, line, stroke, text, whole_decades};
+use pagekit::svg::{CurveStyle, Drawing, Point, Scale, line, stroke, text, whole_decades};
 
 /// Height of a strip's heading and of its plot, in pixels.
 const HEADING: f64 = 30.0;
@@ -17,12 +17,12 @@ const TOP: f64 = 16.0;
 const LABEL: f64 = 16.0;
 
 /// Where each run begins on the time axis.
-struct Runs {
+struct RunStarts {
     starts_s: Vec<u64>,
     length_s: u64,
 }
 
-impl Runs {
+impl RunStarts {
     fn of(report: &Report) -> Self {
         let mut lengths_s: Vec<_> =
             report.runs.iter().map(|run| run.duration_s.ceil().max(0.0) as u64).collect();
@@ -49,12 +49,12 @@ impl Runs {
 
 /// A chart for each family that was watched over time.
 pub(super) fn maxima(report: &Report, families: &[Family<'_>]) -> String {
-    let runs = Runs::of(report);
+    let runs = RunStarts::of(report);
     let without = "No time series: no maxima of single seconds were measured.";
     charts(families, |family, size| chart(family, &runs, size), without)
 }
 
-fn chart(family: &Family<'_>, runs: &Runs, size: &Size) -> String {
+fn chart(family: &Family<'_>, runs: &RunStarts, size: &Size) -> String {
     let members: Vec<_> = family.members.iter().filter(|(_, one)| !one.maxima.is_empty()).collect();
     let values = || members.iter().flat_map(|(_, one)| one.maxima.iter().map(|maximum| maximum.max_ns));
     let (Some(low), Some(high)) = (values().min(), values().max()) else {
@@ -65,13 +65,13 @@ fn chart(family: &Family<'_>, runs: &Runs, size: &Size) -> String {
     let bottom = TOP + (HEADING + PLOT) * members.len() as f64;
     let mut drawn = time(&x, size, runs, bottom);
     let mut reported = Vec::new();
-    for (place, (look, one)) in members.iter().enumerate() {
+    for (place, (style, one)) in members.iter().enumerate() {
         let top = TOP + (HEADING + PLOT) * place as f64 + HEADING;
         let y = Scale::logarithmic(range, (top + PLOT, top));
         let heading = heading(one, runs);
         drawn += &text("name", (LEFT, top - 10.0), &heading);
         drawn += &levels(&y, (LEFT, size.width - RIGHT));
-        drawn += &trace(*look, one, &x, &y, runs);
+        drawn += &trace(*style, one, &x, &y, runs);
         drawn += &stroke("edge", (LEFT, top + PLOT), (size.width - RIGHT, top + PLOT));
         reported.push(heading + ".");
     }
@@ -86,7 +86,7 @@ fn chart(family: &Family<'_>, runs: &Runs, size: &Size) -> String {
 }
 
 /// What stands above a strip: whose it is, and when the largest was.
-fn heading(distribution: &Distribution, runs: &Runs) -> String {
+fn heading(distribution: &Distribution, runs: &RunStarts) -> String {
     let name = distribution.shown_name();
     let Some(largest) = distribution.maxima.iter().max_by_key(|maximum| maximum.max_ns) else { return name };
     let run = if runs.are_several() { format!(" of run {}", largest.run) } else { String::new() };
@@ -94,7 +94,7 @@ fn heading(distribution: &Distribution, runs: &Runs) -> String {
 }
 
 /// The time axis and where each run begins.
-fn time(x: &Scale, size: &Size, runs: &Runs, bottom: f64) -> String {
+fn time(x: &Scale, size: &Size, runs: &RunStarts, bottom: f64) -> String {
     let mut drawn = String::new();
     for value in x.round_values(size.width / 90.0) {
         drawn += &stroke("edge", (x.at(value), bottom), (x.at(value), bottom + 4.0));
@@ -130,22 +130,22 @@ fn levels(y: &Scale, across: (f64, f64)) -> String {
 }
 
 /// Steps over the seconds of each run, and a marker on its largest.
-fn trace(look: Look, distribution: &Distribution, x: &Scale, y: &Scale, runs: &Runs) -> String {
+fn trace(style: CurveStyle, distribution: &Distribution, x: &Scale, y: &Scale, runs: &RunStarts) -> String {
     let base = y.at(0.0);
     let mut drawn = String::new();
     for maxima in distribution.maxima.chunk_by(|one, next| one.run == next.run) {
         let seconds = maxima.iter().map(|maximum| {
             let start_s = runs.at_s(maximum);
-            Second { from: x.at(start_s), to: x.at(start_s + 1.0), y: y.at(maximum.max_ns as f64) }
+            PlottedSecond { from: x.at(start_s), to: x.at(start_s + 1.0), y: y.at(maximum.max_ns as f64) }
         });
         let seconds = thinned(&seconds.collect::<Vec<_>>());
-        let mut places: Vec<Place> = seconds.first().map(|first| (first.from, base)).into_iter().collect();
+        let mut places: Vec<Point> = seconds.first().map(|first| (first.from, base)).into_iter().collect();
         places.extend(seconds.iter().flat_map(|second| [(second.from, second.y), (second.to, second.y)]));
         places.extend(seconds.last().map(|last| (last.to, base)));
-        drawn += &line(&format!("trace {}", look.class()), &places);
+        drawn += &line(&format!("trace {}", style.class()), &places);
         // The pixel rows count downwards.
         if let Some(top) = seconds.iter().min_by(|one, other| one.y.total_cmp(&other.y)) {
-            drawn += &look.marker((0.5 * (top.from + top.to), top.y), false);
+            drawn += &style.marker((0.5 * (top.from + top.to), top.y), false);
             drawn.push('\n');
         }
     }
@@ -154,19 +154,19 @@ fn trace(look: Look, distribution: &Distribution, x: &Scale, y: &Scale, runs: &R
 
 /// A second, or several that share a column, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Second {
+struct PlottedSecond {
     from: f64,
     to: f64,
     y: f64,
 }
 
 /// Of each column of pixels the largest value alone.
-fn thinned(seconds: &[Second]) -> Vec<Second> {
+fn thinned(seconds: &[PlottedSecond]) -> Vec<PlottedSecond> {
     let columns = seconds.chunk_by(|one, other| one.from.floor() == other.from.floor());
     let merged = columns.filter_map(|column| {
         let (first, last) = (column.first()?, column.last()?);
         let y = column.iter().map(|second| second.y).fold(f64::INFINITY, f64::min);
-        Some(Second { from: first.from, to: last.to, y })
+        Some(PlottedSecond { from: first.from, to: last.to, y })
     });
     merged.collect()
 }
@@ -177,7 +177,7 @@ mod tests {
 
     #[test]
     fn thinning_keeps_the_largest_of_a_column() {
-        let second = |from, to, y| Second { from, to, y };
+        let second = |from, to, y| PlottedSecond { from, to, y };
         let seconds =
             [second(1.1, 1.5, 50.0), second(1.5, 1.9, 3.0), second(1.9, 2.3, 40.0), second(2.3, 2.7, 60.0)];
         assert_eq!(thinned(&seconds), [second(1.1, 2.3, 3.0), second(2.3, 2.7, 60.0)]);

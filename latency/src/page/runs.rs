@@ -49,7 +49,7 @@ fn arrival_cells(of: &ArrivalRow) -> Vec<Cell> {
     let counts = [of.period_ms, of.count, of.gaps].map(|value| number(number::count(value)));
     let bursts = of.bursts.map_or_else(|| text("sent on change too"), |bursts| number(number::count(bursts)));
     let PercentilesNs { p99, p999, max, .. } = of.interval_ns;
-    let lengths = [p99, p999, max].map(|ns| number(number::maybe_us(ns)));
+    let lengths = [p99, p999, max].map(|ns| number(number::us_or_not_measured(ns)));
     [text(&of.receiver), text(&of.frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
 }
 
@@ -71,15 +71,15 @@ pub(super) fn counts(runs: &[RunPart]) -> String {
         "{}{}{}{}{}{}",
         table.html_or("No run was given."),
         lacking(runs),
-        tally("Lost, late, duplicate, malformed frames", tallies::frames(runs)),
-        tally("Command age in cycles", tallies::command_ages(runs)),
+        count_table("Lost, late, duplicate, malformed frames", tallies::frames(runs)),
+        count_table("Command age in cycles", tallies::command_ages(runs)),
         counted(runs),
         each_percentiles(runs)
     )
 }
 
 /// A table of counts under its heading.
-fn tally(title: &str, grid: Option<Grid>) -> String {
+fn count_table(title: &str, grid: Option<Grid>) -> String {
     let Some(grid) = grid else { return String::new() };
     let mut table = Table::new(title, grid.head);
     for mut row in grid.rows {

@@ -10,11 +10,11 @@
 
 use super::histograms::scrolling;
 use crate::files::EMULATOR;
-use crate::model::{AroundRow, Event, ProbeGap};
+use crate::model::{Event, NearbyCycle, ProbeGap};
 use pagekit::markup::none;
 use pagekit::number;
 use pagekit::svg::{
-    Drawing, Look, Place, Scale, bar, legend_entry, line, stroke, text, time_axis, whole_decades,
+    CurveStyle, Drawing, Point, Scale, bar, legend_entry, line, stroke, text, time_axis, whole_decades,
 };
 use protocol::periods::CYCLE_NS;
 use std::collections::BTreeSet;
@@ -42,16 +42,16 @@ fn window(event: &Event) -> (f64, f64) {
     let length_us = (event.late_ns.saturating_add(event.slow_ns)) as f64 * 1e-3;
     // A long stall is seen in its place: more is shown around it, before it no more than there is.
     let room_us = 0.5 * length_us;
-    let starts = event.around.values().flatten().map(|row| row.due_us);
+    let starts = event.nearby_cycles.values().flatten().map(|row| row.due_us);
     let first_us = starts.filter(|start| start.is_finite()).fold(0.0, f64::min);
-    let ends = event.around.values().flatten().map(end_us).chain(gap_ends(&event.probe));
+    let ends = event.nearby_cycles.values().flatten().map(end_us).chain(gap_ends(&event.probe));
     let last_us = ends.filter(|end| end.is_finite()).fold(length_us, f64::max);
     let rim_us = 0.1 * BEFORE_US + 0.02 * length_us;
     let to_us = last_us.min(length_us + room_us.max(AFTER_US)) + rim_us;
     (first_us.max(-room_us.max(BEFORE_US)) - rim_us, to_us)
 }
 
-fn end_us(row: &AroundRow) -> f64 {
+fn end_us(row: &NearbyCycle) -> f64 {
     row.due_us + row.late_us + row.execution_us
 }
 
@@ -62,7 +62,7 @@ fn gap_ends(gaps: &[ProbeGap]) -> impl Iterator<Item = f64> {
 /// Lateness of the event's own cycles, each at its due time: the rig writes no row for a cycle that it missed, only for the
 /// one that it woke in. Nothing when the first of them has its row.
 fn missed(event: &Event) -> Vec<(f64, f64)> {
-    let rows = event.around.get(&event.process).map_or(&[][..], Vec::as_slice);
+    let rows = event.nearby_cycles.get(&event.process).map_or(&[][..], Vec::as_slice);
     if event.late_ns == 0 || rows.iter().any(|row| row.cycle == event.cycle) {
         return Vec::new();
     }
@@ -73,9 +73,9 @@ fn missed(event: &Event) -> Vec<(f64, f64)> {
 }
 
 /// The rows of each process, the rig's first.
-pub(super) fn by_process(event: &Event) -> Vec<(&str, &[AroundRow])> {
+pub(super) fn by_process(event: &Event) -> Vec<(&str, &[NearbyCycle])> {
     let mut processes: Vec<_> =
-        event.around.iter().map(|(process, rows)| (process.as_str(), rows.as_slice())).collect();
+        event.nearby_cycles.iter().map(|(process, rows)| (process.as_str(), rows.as_slice())).collect();
     processes.sort_by_key(|(process, _)| *process != EMULATOR);
     processes
 }
@@ -96,17 +96,17 @@ fn lanes(gaps: &[ProbeGap]) -> (BTreeSet<u64>, usize) {
 }
 
 /// Whether all of it can be drawn.
-fn is_known(row: &AroundRow) -> bool {
+fn is_known(row: &NearbyCycle) -> bool {
     [row.due_us, row.late_us, row.execution_us].iter().all(|value| value.is_finite())
 }
 
 pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
     let (from_us, to_us) = window(event);
     let x = Scale::linear((from_us * 1e-3, to_us * 1e-3), (LEFT, RIGHT));
-    let processes: Vec<(&str, Vec<&AroundRow>)> = by_process(event)
+    let processes: Vec<(&str, Vec<&NearbyCycle>)> = by_process(event)
         .into_iter()
         .map(|(process, rows)| {
-            let shown = |row: &&AroundRow| is_known(row) && row.due_us <= to_us && end_us(row) >= from_us;
+            let shown = |row: &&NearbyCycle| is_known(row) && row.due_us <= to_us && end_us(row) >= from_us;
             (process, rows.iter().filter(shown).collect())
         })
         .collect();
@@ -120,9 +120,9 @@ pub(super) fn timeline(event: &Event, place: usize, is_probed: bool) -> String {
     let mut y = UPPER + 12.0;
     for (index, (process, rows)) in processes.iter().enumerate() {
         drawn += &lane_name(process, y);
-        drawn.extend(rows.iter().map(|row| lane_bars(row, Look::Ours(index), y, &x)));
+        drawn.extend(rows.iter().map(|row| lane_bars(row, CurveStyle::Ours(index), y, &x)));
         if let Some((due_us, late_us)) = missed.first().filter(|_| *process == event.process) {
-            drawn += &waiting_bar((*due_us, due_us + late_us), Look::Ours(index), y, &x);
+            drawn += &waiting_bar((*due_us, due_us + late_us), CurveStyle::Ours(index), y, &x);
         }
         y += LANE;
     }
@@ -184,7 +184,7 @@ fn short(value: f64) -> String {
 
 /// Lateness and execution of each cycle.
 fn upper(
-    processes: &[(&str, Vec<&AroundRow>)],
+    processes: &[(&str, Vec<&NearbyCycle>)],
     (late_process, missed): (&str, &[(f64, f64)]),
     x: &Scale,
     from_us: f64,
@@ -200,26 +200,26 @@ fn upper(
     drawn += &stroke("edge", (LEFT, UPPER), (RIGHT, UPPER));
     drawn += &stroke("edge", (LEFT, TOP), (LEFT, UPPER));
     for (index, (process, rows)) in processes.iter().enumerate() {
-        let look = Look::Ours(index);
+        let style = CurveStyle::Ours(index);
         if *process == late_process {
             let places = missed.iter().map(|(due_us, late_us)| (x.at(due_us * 1e-3), y.at(late_us * 1e3)));
-            let places: Vec<Place> = places.collect();
-            drawn += &line(&format!("line {}", look.class()), &places);
-            drawn.extend(places.iter().map(|place| look.marker(*place, false)));
+            let places: Vec<Point> = places.collect();
+            drawn += &line(&format!("line {}", style.class()), &places);
+            drawn.extend(places.iter().map(|place| style.marker(*place, false)));
         }
         // Cycles that were missed have no row: no line leads over them.
         let in_sight = rows.iter().copied().filter(|row| row.due_us >= from_us).collect::<Vec<_>>();
         for piece in in_sight.chunk_by(|one, other| one.cycle + 1 == other.cycle) {
-            let places = |value: fn(&AroundRow) -> f64| -> Vec<Place> {
+            let places = |value: fn(&NearbyCycle) -> f64| -> Vec<Point> {
                 piece.iter().map(|row| (x.at(row.due_us * 1e-3), y.at(value(row) * 1e3))).collect()
             };
             let (late, execution) = (places(|row| row.late_us), places(|row| row.execution_us));
-            drawn += &line(&format!("line thin {}", look.class()), &execution);
-            drawn += &line(&format!("line {}", look.class()), &late);
+            drawn += &line(&format!("line thin {}", style.class()), &execution);
+            drawn += &line(&format!("line {}", style.class()), &late);
             // Where markers would touch, the lines say it all.
             if in_sight.len() <= MOST_MARKERS || piece.len() == 1 {
-                drawn.extend(execution.iter().map(|place| look.marker(*place, true)));
-                drawn.extend(late.iter().map(|place| look.marker(*place, false)));
+                drawn.extend(execution.iter().map(|place| style.marker(*place, true)));
+                drawn.extend(late.iter().map(|place| style.marker(*place, false)));
             }
         }
         drawn.push('\n');
@@ -228,13 +228,13 @@ fn upper(
 }
 
 /// When a cycle waited and ran.
-fn lane_bars(row: &AroundRow, look: Look, y: f64, x: &Scale) -> String {
-    let class = look.class();
+fn lane_bars(row: &NearbyCycle, style: CurveStyle, y: f64, x: &Scale) -> String {
+    let class = style.class();
     let at = |us: f64| x.at(us * 1e-3);
     let (due, woke) = (at(row.due_us), at(row.due_us + row.late_us));
     let done = at(row.due_us + row.late_us + row.execution_us).max(woke + 1.2);
     let waiting = if woke - due > 1.5 {
-        waiting_bar((row.due_us, row.due_us + row.late_us), look, y, x)
+        waiting_bar((row.due_us, row.due_us + row.late_us), style, y, x)
     } else {
         String::new()
     };
@@ -242,19 +242,19 @@ fn lane_bars(row: &AroundRow, look: Look, y: f64, x: &Scale) -> String {
 }
 
 /// From due to woke, us.
-fn waiting_bar((due_us, woke_us): (f64, f64), look: Look, y: f64, x: &Scale) -> String {
-    let class = format!("bar wait {}", look.class());
+fn waiting_bar((due_us, woke_us): (f64, f64), style: CurveStyle, y: f64, x: &Scale) -> String {
+    let class = format!("bar wait {}", style.class());
     bar(&class, (x.at(due_us * 1e-3), y + 8.0), (x.at(woke_us * 1e-3), y + LANE - 8.0))
 }
 
-fn legend(processes: &[(&str, Vec<&AroundRow>)], gaps: &[ProbeGap]) -> String {
+fn legend(processes: &[(&str, Vec<&NearbyCycle>)], gaps: &[ProbeGap]) -> String {
     let mut entries = String::new();
     for (index, (process, _)) in processes.iter().enumerate() {
-        let look = Look::Ours(index);
-        let class = look.class();
+        let style = CurveStyle::Ours(index);
+        let class = style.class();
         for (line_class, is_hollow, what) in [("line", false, "lateness"), ("line thin", true, "execution")] {
             let sample = line(&format!("{line_class} {class}"), &[(1.0, 7.0), (37.0, 7.0)]);
-            let sample = sample + &look.marker((19.0, 7.0), is_hollow);
+            let sample = sample + &style.marker((19.0, 7.0), is_hollow);
             entries += &legend_entry(&sample, &format!("{process}: {what}"));
         }
     }
@@ -278,19 +278,19 @@ mod tests {
     use std::collections::BTreeMap;
 
     fn event(skipped: u64, cycles: &[u64]) -> Event {
-        let row = |cycle: &u64| AroundRow {
+        let row = |cycle: &u64| NearbyCycle {
             cycle: *cycle,
             due_us: (*cycle as f64 - 100.0) * CYCLE_US,
             late_us: 9.0,
             execution_us: 20.0,
-            ..AroundRow::default()
+            ..NearbyCycle::default()
         };
         Event {
             process: "emulator".into(),
             cycle: 100,
             late_ns: skipped * 1_000_000 + 9000,
             skipped,
-            around: BTreeMap::from([("emulator".into(), cycles.iter().map(row).collect())]),
+            nearby_cycles: BTreeMap::from([("emulator".into(), cycles.iter().map(row).collect())]),
             ..Event::default()
         }
     }

@@ -11,9 +11,9 @@ const RUNS: usize = 10;
 const SECONDS: u64 = 60;
 
 /// The same numbers every time, spread over the unit interval.
-struct Spread(u64);
+struct PseudoRandom(u64);
 
-impl Spread {
+impl PseudoRandom {
     fn next(&mut self) -> f64 {
         // Knuth's linear congruence; its upper bits are good enough for a picture.
         self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -29,11 +29,11 @@ impl Spread {
 }
 
 fn distribution(name: &str, source: Source, about: &str, middle_ns: f64) -> Distribution {
-    let mut spread = Spread(name.bytes().map(u64::from).sum());
+    let mut random = PseudoRandom(name.bytes().map(u64::from).sum());
     let (mut all, mut maxima) = (Samples::default(), Vec::new());
     for run in 0..RUNS {
         for second in 0..SECONDS {
-            let samples: Vec<_> = (0..200).map(|_| spread.latency_ns(middle_ns)).collect();
+            let samples: Vec<_> = (0..200).map(|_| random.latency_ns(middle_ns)).collect();
             let max_ns = samples.iter().copied().max().unwrap_or_default();
             maxima.push(Maximum { run, second, max_ns });
             samples.iter().for_each(|ns| all.record(*ns, 1));
@@ -91,43 +91,43 @@ fn distributions() -> Vec<Distribution> {
 }
 
 fn ratio(name: &str, middle: f64, reference_ns: f64) -> Ratio {
-    let mut spread = Spread(7 + name.len() as u64);
+    let mut random = PseudoRandom(7 + name.len() as u64);
     let pair = |_| {
-        let reference_ns = reference_ns * (0.9 + 0.2 * spread.next());
-        ((reference_ns * middle * (0.85 + 0.3 * spread.next())) as u64, reference_ns as u64)
+        let reference_ns = reference_ns * (0.9 + 0.2 * random.next());
+        ((reference_ns * middle * (0.85 + 0.3 * random.next())) as u64, reference_ns as u64)
     };
     let pairs_ns: Vec<(u64, u64)> = (0..RUNS).map(pair).collect();
     let (interval, confidence) = (Some((middle * 0.93, middle * 1.08)), Some(0.979));
     Ratio { name: name.into(), pairs_ns, median: middle, interval, confidence }
 }
 
-fn row(cycle: u64, due_us: f64, late_us: f64, execution_us: f64) -> AroundRow {
+fn row(cycle: u64, due_us: f64, late_us: f64, execution_us: f64) -> NearbyCycle {
     let run_delay_us = if late_us > 100.0 { late_us * 0.02 } else { 0.0 };
-    AroundRow { cycle, due_us, late_us, execution_us, run_delay_us, cpu: 1, ..AroundRow::default() }
+    NearbyCycle { cycle, due_us, late_us, execution_us, run_delay_us, cpu: 1, ..NearbyCycle::default() }
 }
 
 /// Ten cycles before, the late one, those after it.
-fn around(process: &str, cycle: u64, late_us: f64, spread: &mut Spread) -> Vec<AroundRow> {
+fn nearby_cycles(process: &str, cycle: u64, late_us: f64, random: &mut PseudoRandom) -> Vec<NearbyCycle> {
     let missed = (late_us / 1000.0) as i64;
     let places = (-10..=0).chain(missed + 1..missed + 12);
     let offset_us = if process == "emulator" { 0.0 } else { 48.0 };
     let one = |place: i64| {
-        let usual_us = 10.0 + 14.0 * spread.next();
+        let usual_us = 10.0 + 14.0 * random.next();
         let late_us = if place == 0 { late_us + usual_us } else { usual_us };
-        let execution_us = 21.0 + 9.0 * spread.next();
+        let execution_us = 21.0 + 9.0 * random.next();
         row(cycle.wrapping_add_signed(place), place as f64 * 1000.0 + offset_us, late_us, execution_us)
     };
     places.map(one).collect()
 }
 
 fn event(place: u64, cause: Cause, late_us: f64, sentence: &str, evidence: &[&str]) -> Event {
-    let mut spread = Spread(place);
+    let mut random = PseudoRandom(place);
     let cycle = 12_345 + 977 * place;
     let process = if cause == Cause::ControllerStopped { "controller" } else { "emulator" };
     let both_are_late = cause == Cause::MachineStoodStill;
     let late_of = |one: &str| if one == process || both_are_late { late_us } else { 4.0 };
-    let around = ["emulator", "controller"]
-        .map(|one| (one.to_owned(), around(one, cycle, late_of(one), &mut spread)))
+    let nearby_cycles = ["emulator", "controller"]
+        .map(|one| (one.to_owned(), nearby_cycles(one, cycle, late_of(one), &mut random)))
         .into();
     let gap = |cpu, from_us, length_us, another_ran| ProbeGap { cpu, from_us, length_us, another_ran };
     let probe = match cause {
@@ -148,7 +148,7 @@ fn event(place: u64, cause: Cause, late_us: f64, sentence: &str, evidence: &[&st
         cause,
         sentence: sentence.into(),
         evidence: evidence.iter().map(|one| (*one).to_owned()).collect(),
-        around,
+        nearby_cycles,
         probe,
         waited_ns: 0,
         machine_ran: cause != Cause::MachineStoodStill,
