@@ -12,7 +12,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `line` | the bus from the side of the rig, cycle by cycle |
+//! | `rig_bus` | the bus from the side of the rig, cycle by cycle |
 //! | `stand_in` | the frames of a rig, and a carriage that follows |
 //! | `observer` | what the controller sent |
 //! | `judge` | the checks |
@@ -20,8 +20,8 @@
 
 pub(crate) mod cli;
 mod judge;
-mod line;
 mod observer;
+mod rig_bus;
 mod stand_in;
 
 use crate::junit::{self, Case};
@@ -29,15 +29,15 @@ use crate::say;
 use crate::soak::model::CheckResult;
 use cli::{CheckPace, ConformanceArguments};
 use judge::{Phase, case};
-use line::{Broken, Line};
 use observer::Observer;
 use protocol::bus::{BusError, BusUrl, WireOptions};
 use protocol::can::CanFrame;
 use protocol::exit::Exit;
 use realtime::{Interrupt, Request};
+use rig_bus::{ExchangeError, RigBus};
 use runlog::run_folder::FileError;
 use rustix::process::{Pid, Signal, kill_process};
-use stand_in::{Disturbance, StandIn};
+use stand_in::{Disturbance, RigStandIn};
 use std::io;
 use std::os::unix::fs::DirBuilderExt;
 use std::os::unix::process::CommandExt;
@@ -109,11 +109,11 @@ pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceE
     };
     let real = arguments.pace == CheckPace::Real;
     let mut cases: Vec<Case> = Vec::new();
-    let sessions: [Part; 3] = [regular, emergency_stop, sensor_loss];
-    for part in sessions {
+    let sessions: [SessionSteps; 3] = [regular, emergency_stop, sensor_loss];
+    for steps in sessions {
         let at = Instant::now();
         let session = Session::open(&url, arguments, &interrupt)?;
-        let mut found = if real { with_priority(session, part, cases.is_empty()) } else { part(session) }?;
+        let mut found = if real { with_priority(session, steps, cases.is_empty()) } else { steps(session) }?;
         if let Some(first) = found.first_mut() {
             first.time_s = at.elapsed().as_secs_f64();
         }
@@ -129,13 +129,13 @@ pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceE
 }
 
 /// Steps of a session.
-type Part = for<'a> fn(Session<'a>) -> Result<Vec<Case>, ConformanceError>;
+type SessionSteps = for<'a> fn(Session<'a>) -> Result<Vec<Case>, ConformanceError>;
 
 /// Runs the steps in a thread of FIFO priority. In the main thread the controllers that it starts would inherit the priority
 /// and appear better than they are.
 fn with_priority(
     session: Session<'_>,
-    part: Part,
+    steps: SessionSteps,
     report_refusals: bool,
 ) -> Result<Vec<Case>, ConformanceError> {
     std::thread::scope(|scope| {
@@ -143,7 +143,7 @@ fn with_priority(
             let grants = realtime::acquire(&Request::for_a_loop(FIFO_PRIORITY, None));
             let refusals = grants.refusals.iter().filter(|_| report_refusals);
             refusals.for_each(|refusal| eprintln!("bench: warning: {refusal}"));
-            part(session)
+            steps(session)
         });
         thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
@@ -165,15 +165,15 @@ fn print_results(cases: &[Case]) {
 struct Session<'a> {
     arguments: &'a ConformanceArguments,
     interrupt: &'a Interrupt,
-    // Before the line: the controller is terminated while its bus still exists.
+    // Before the bus: the controller is terminated while its bus still exists.
     controller: Option<Controller>,
-    line: Line,
-    rig: StandIn,
+    bus: RigBus,
+    rig: RigStandIn,
     observer: Observer,
     /// Cycles that were sent, with their stamps; no stamp where this process was late.
     cycles: Vec<(u64, Option<u64>)>,
     cycle: u64,
-    broken: Option<Broken>,
+    exchange_error: Option<ExchangeError>,
     frames: Vec<CanFrame>,
 }
 
@@ -181,7 +181,7 @@ struct Session<'a> {
 fn regular(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
     let answers = session.wait_for_answers()?;
     let result = if answers { CheckResult::Passed } else { CheckResult::Failed };
-    let mut cases = vec![case("regular", "answers", result, session.about_answers())];
+    let mut cases = vec![case("regular", "answers", result, session.answers_detail())];
     if !answers {
         return Ok(cases);
     }
@@ -204,19 +204,19 @@ fn regular(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
         let detail = "simulated time skips nothing: check it with --pace real".into();
         cases.push(case("skipped-cycles", "every-cycle", CheckResult::Skipped, detail));
     }
-    cases.push(session.about_the_end("regular"));
+    cases.push(session.completion_case("regular"));
     Ok(cases)
 }
 
 /// The valve opens, and the emergency stop is tripped.
 fn emergency_stop(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
     if !session.wait_for_open_valve()? {
-        return Ok(vec![session.nothing_to_see("emergency-stop")]);
+        return Ok(vec![session.valve_shut_case("emergency-stop")]);
     }
     let from = session.cycle;
     session.cycles(STOP_CYCLES, Disturbance { stopped_since: Some(from), ..Disturbance::default() })?;
     let mut cases = judge::emergency_stop(&session.observer.received, from..session.cycle);
-    cases.push(session.about_the_end("emergency-stop"));
+    cases.push(session.completion_case("emergency-stop"));
     Ok(cases)
 }
 
@@ -228,14 +228,14 @@ fn sensor_loss(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> 
         return Ok(vec![case("sensor-loss", "valve-shut", CheckResult::Skipped, detail.into())]);
     }
     if !session.wait_for_open_valve()? {
-        return Ok(vec![session.nothing_to_see("sensor-loss")]);
+        return Ok(vec![session.valve_shut_case("sensor-loss")]);
     }
     let from = session.cycle;
     session.cycles(LOSS_CYCLES, Disturbance { sensors_lost: true, ..Disturbance::default() })?;
     let back = session.cycle;
     session.cycles(BACK_CYCLES, Disturbance::default())?;
     let mut cases = judge::sensor_loss(&session.observer.received, from..back, back..session.cycle);
-    cases.push(session.about_the_end("sensor-loss"));
+    cases.push(session.completion_case("sensor-loss"));
     Ok(cases)
 }
 
@@ -245,7 +245,7 @@ impl<'a> Session<'a> {
         arguments: &'a ConformanceArguments,
         interrupt: &'a Interrupt,
     ) -> Result<Self, ConformanceError> {
-        let line = Line::open(url, arguments)?;
+        let bus = RigBus::open(url, arguments)?;
         let controller = Controller::start(url, arguments)?;
         if controller.is_none() {
             eprintln!("bench: waiting for the controller on {url}; reset it if it ran before");
@@ -255,15 +255,15 @@ impl<'a> Session<'a> {
             arguments,
             interrupt,
             controller,
-            line,
-            rig: StandIn::new(arguments.axis, lockstep),
+            bus,
+            rig: RigStandIn::new(arguments.axis, lockstep),
             observer: Observer::new(arguments.axis, arguments.both_axes),
             cycles: Vec::new(),
             cycle: 0,
-            broken: None,
+            exchange_error: None,
             frames: Vec::new(),
         };
-        session.broken = session.line.begin().err();
+        session.exchange_error = session.bus.begin().err();
         Ok(session)
     }
 
@@ -273,16 +273,16 @@ impl<'a> Session<'a> {
             if self.interrupt.came() {
                 return Err(ConformanceError::Interrupted);
             }
-            if self.broken.is_some() || self.observer.babbles() {
+            if self.exchange_error.is_some() || self.observer.babbles() {
                 return Ok(());
             }
             self.rig.frames(self.cycle, &disturbance, &mut self.frames);
             self.observer.note_sent(self.cycle, !disturbance.sensors_lost);
             let observer = &mut self.observer;
-            match self.line.exchange(&self.frames, |frame, stamp_ns| observer.take(frame, stamp_ns)) {
+            match self.bus.exchange(&self.frames, |frame, stamp_ns| observer.take(frame, stamp_ns)) {
                 Ok(sent) => self.cycles.push((self.cycle, (!sent.disturbed).then_some(sent.stamp_ns))),
-                Err(broken) => {
-                    self.broken = Some(broken);
+                Err(error) => {
+                    self.exchange_error = Some(error);
                     return Ok(());
                 }
             }
@@ -300,7 +300,7 @@ impl<'a> Session<'a> {
     fn wait_for_answers(&mut self) -> Result<bool, ConformanceError> {
         for _ in 0..self.patience_cycles() {
             self.cycles(1, Disturbance::default())?;
-            if !self.observer.received.is_empty() || self.broken.is_some() {
+            if !self.observer.received.is_empty() || self.exchange_error.is_some() {
                 break;
             }
         }
@@ -316,7 +316,7 @@ impl<'a> Session<'a> {
             if open_cycles >= OPEN_CYCLES && waited > SETTLING_CYCLES {
                 return Ok(true);
             }
-            if self.broken.is_some() {
+            if self.exchange_error.is_some() {
                 return Ok(false);
             }
             if waited % PUSH_EVERY_CYCLES == 0 {
@@ -332,20 +332,20 @@ impl<'a> Session<'a> {
         Phase { cycles: &self.cycles[first..], received: &self.observer.received[received..] }
     }
 
-    fn about_answers(&self) -> String {
-        match (&self.broken, self.observer.received.first()) {
+    fn answers_detail(&self) -> String {
+        match (&self.exchange_error, self.observer.received.first()) {
             (_, Some(first)) => format!("the first frame came in cycle {}", first.cycle),
-            (Some(Broken::NobodyThere), _) => "nobody is in the barrier".into(),
-            (Some(Broken::TimedOut(name)), _) => format!("{name} did not answer cycle {}", self.cycle),
+            (Some(ExchangeError::NobodyThere), _) => "nobody is in the barrier".into(),
+            (Some(ExchangeError::TimedOut(name)), _) => format!("{name} did not answer cycle {}", self.cycle),
             (None, None) => format!("nothing came in {} cycles", self.cycle),
         }
     }
 
     /// Whether the controller ran to the end. A crash shuts the valve too, and must not pass for the right reaction.
-    fn about_the_end(&mut self, class: &str) -> Case {
+    fn completion_case(&mut self, class: &str) -> Case {
         let ended = self.controller.as_mut().and_then(Controller::ended);
-        let why = match (&self.broken, ended) {
-            (Some(broken), _) => format!("{broken:?}"),
+        let why = match (&self.exchange_error, ended) {
+            (Some(error), _) => format!("{error:?}"),
             (None, _) if self.observer.babbles() => {
                 format!("it babbles, {} frames", self.observer.received.len())
             }
@@ -358,9 +358,9 @@ impl<'a> Session<'a> {
         case(class, "to-the-end", CheckResult::Failed, format!("in cycle {}: {why}", self.cycle))
     }
 
-    fn nothing_to_see(&self, class: &str) -> Case {
-        let why = match &self.broken {
-            Some(broken) => format!("in cycle {}: {broken:?}", self.cycle),
+    fn valve_shut_case(&self, class: &str) -> Case {
+        let why = match &self.exchange_error {
+            Some(error) => format!("in cycle {}: {error:?}", self.cycle),
             None => format!(
                 "its valve did not open by more than {OPEN} for {OPEN_CYCLES} cycles in {} s: nothing could be seen; let it move",
                 self.arguments.patience

@@ -29,7 +29,7 @@ use signals::{LEFT_OUT, Signals};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use table::Rows;
+use table::TimeAxis;
 
 /// Most rows with a fixed period: a log with a gap of years must not fill the disk.
 const MOST_HELD_ROWS: u64 = 100_000_000;
@@ -108,7 +108,7 @@ fn as_signals(
             return Err(ExportError::TooManyRows { every_ms });
         }
         let rows = create(part).and_then(|mut file| {
-            let rows = table::write(&mut file, &signals, Rows { origin_ns, every_ms })?;
+            let rows = table::write(&mut file, &signals, TimeAxis { origin_ns, every_ms })?;
             file.flush().map(|()| rows)
         });
         format!(" in {} rows", rows.map_err(|error| written(&error))?)
@@ -179,9 +179,9 @@ fn as_frames(
     let reported = format!("{} frames", log.frames.len());
     match foreign::write(part, log, format, &python)? {
         None => Ok((format!("{reported}, read back equal"), Exit::Good)),
-        Some(said) => {
+        Some(output) => {
             warn(&format!(
-                "what was written does not read back as it was: {said} (frames, and the first of them)"
+                "what was written does not read back as it was: {output} (frames, and the first of them)"
             ));
             Ok((reported, Exit::BoundBroken))
         }

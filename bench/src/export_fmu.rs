@@ -55,7 +55,7 @@ pub(crate) fn run(arguments: &ExportFmuArguments) -> Result<Exit, ExportFmuError
         description::of_file(&rig_toml, &rig.display().to_string()).map_err(ExportFmuError::Rig)?;
     let library = match library {
         Some(library) => read(library)?,
-        None => read(&beside()?)?,
+        None => read(&shipped_library()?)?,
     };
     let part = part_of(out);
     let written =
@@ -74,7 +74,7 @@ fn library_name() -> String {
 }
 
 /// The library in the folder of this program, where cargo puts it as a target of its own or as a dependency.
-fn beside() -> Result<PathBuf, ExportFmuError> {
+fn shipped_library() -> Result<PathBuf, ExportFmuError> {
     let program = std::env::current_exe().unwrap_or_default();
     let folder = program.parent().unwrap_or(Path::new("."));
     let places = [folder.join(library_name()), folder.join("deps").join(library_name())];

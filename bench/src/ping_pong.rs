@@ -15,13 +15,12 @@
 //!   rig does not wait for the answer but finds it at its next cycle.
 
 pub(crate) mod cli;
-mod line;
 mod rally;
+mod transport;
 
 use crate::{say, warn};
 use cli::{PingPongArguments, PongArguments};
 use latency::kinds::{PING_PONG, TO_ARRIVAL};
-use line::{Line, OnBus, OnSocket};
 use protocol::bus::{self, BusError, BusUrl, StampClock};
 use protocol::exit::Exit;
 use rally::{PingPongResult, PingSchedule};
@@ -34,6 +33,7 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use transport::{BusTransport, FrameTransport, SocketTransport};
 
 /// Time without pings after which the answering process ends.
 const SILENCE: Duration = Duration::from_secs(10);
@@ -68,10 +68,10 @@ pub(crate) fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> 
     let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let interrupt = Interrupt::watch().map_err(|error| PingPongError::system("no signal handler", error))?;
     // Before this process acquires real-time privileges, which the child would inherit.
-    let (mut line, mut other) = open(arguments)?;
-    let played = play(arguments, &mut *line, &interrupt);
+    let (mut transport, mut other) = open(arguments)?;
+    let played = play(arguments, &mut *transport, &interrupt);
     // On a socket pair the child ends when we close ours; on a bus it would wait for more.
-    drop(line);
+    drop(transport);
     let _ = other.kill();
     let _ = other.wait();
     let (rally, grants) = played?;
@@ -99,36 +99,36 @@ pub(crate) fn pong(arguments: &PongArguments) -> Result<Exit, PingPongError> {
     // The parent may be killed and could not end this process then.
     rustix::process::set_parent_process_death_signal(Some(rustix::process::Signal::TERM))
         .map_err(|errno| PingPongError::system("no signal when the parent ends", errno))?;
-    let mut line = match &arguments.bus {
+    let mut transport = match &arguments.bus {
         Some(url) => on_bus(url)?,
         None => on_socket(io::stdin().as_fd().try_clone_to_owned())?,
     };
     let _grants = grants(arguments.priority, arguments.cpu);
-    rally::answer(&mut *line, &MonotonicClock, SILENCE);
+    rally::answer(&mut *transport, &MonotonicClock, SILENCE);
     Ok(Exit::Good)
 }
 
 fn play(
     arguments: &PingPongArguments,
-    line: &mut dyn Line,
+    transport: &mut dyn FrameTransport,
     interrupt: &Interrupt,
 ) -> Result<(PingPongResult, Grants), PingPongError> {
     let grants = grants((!arguments.no_realtime).then_some(arguments.priority), arguments.cpu);
     let interval = Duration::from_micros(arguments.interval_us);
     let pings = (arguments.seconds * 1e6 / arguments.interval_us as f64).round().max(1.0) as u64;
     let gone = |_| PingPongError::Silent("any more: the process that answers has ended".into());
-    if !rally::serve(line, &MonotonicClock, interrupt).map_err(gone)? && !interrupt.came() {
+    if !rally::serve(transport, &MonotonicClock, interrupt).map_err(gone)? && !interrupt.came() {
         let bus = arguments.bus.as_ref().map_or_else(String::new, |bus| format!(" on {bus}"));
-        let up = if line.is_up() { "" } else { ", which is down" };
+        let up = if transport.is_up() { "" } else { ", which is down" };
         return Err(PingPongError::Silent(format!("within 5 s{bus}{up}")));
     }
     let rally =
-        rally::ask(line, &MonotonicClock, PingSchedule { interval, pings }, interrupt).map_err(gone)?;
+        rally::ask(transport, &MonotonicClock, PingSchedule { interval, pings }, interrupt).map_err(gone)?;
     Ok((rally, grants))
 }
 
 /// Our end, and the process at the other end.
-fn open(arguments: &PingPongArguments) -> Result<(Box<dyn Line>, Child), PingPongError> {
+fn open(arguments: &PingPongArguments) -> Result<(Box<dyn FrameTransport>, Child), PingPongError> {
     let program = std::env::current_exe();
     let program = program.map_err(|error| PingPongError::system("this program's own path", error))?;
     let mut command = Command::new(program);
@@ -139,7 +139,7 @@ fn open(arguments: &PingPongArguments) -> Result<(Box<dyn Line>, Child), PingPon
     if let Some(cpu) = arguments.peer_cpu {
         command.args(["--cpu", &cpu.to_string()]);
     }
-    let line = match &arguments.bus {
+    let transport = match &arguments.bus {
         Some(url) => {
             command.args(["--bus", &url.to_string()]);
             on_bus(url)?
@@ -152,18 +152,18 @@ fn open(arguments: &PingPongArguments) -> Result<(Box<dyn Line>, Child), PingPon
         }
     };
     let other = command.spawn().map_err(|error| PingPongError::system("no second process", error))?;
-    Ok((line, other))
+    Ok((transport, other))
 }
 
-fn on_bus(url: &BusUrl) -> Result<Box<dyn Line>, PingPongError> {
+fn on_bus(url: &BusUrl) -> Result<Box<dyn FrameTransport>, PingPongError> {
     let clock: StampClock = Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns));
-    Ok(Box::new(OnBus(bus::open(url, clock)?)))
+    Ok(Box::new(BusTransport(bus::open(url, clock)?)))
 }
 
-fn on_socket(socket: io::Result<OwnedFd>) -> Result<Box<dyn Line>, PingPongError> {
+fn on_socket(socket: io::Result<OwnedFd>) -> Result<Box<dyn FrameTransport>, PingPongError> {
     let refused = |reason: String| PingPongError::System { what: "no socket to read from", reason };
     let socket = socket.map_err(|error| refused(error.to_string()))?;
-    Ok(Box::new(OnSocket::new(socket).map_err(|errno| refused(errno.to_string()))?))
+    Ok(Box::new(SocketTransport::new(socket).map_err(|errno| refused(errno.to_string()))?))
 }
 
 /// Acquires real-time privileges for this thread and warns of refusals.

@@ -26,7 +26,7 @@ mod gaps;
 use crate::say;
 use cli::ProbeArguments;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use gaps::{Gap, GapWatch, Total};
+use gaps::{Gap, GapTotal, GapWatch};
 use latency::probe::COLUMNS;
 use protocol::exit::Exit;
 use realtime::privileges::parse_cpu_list;
@@ -65,8 +65,8 @@ pub(crate) enum ProbeError {
 /// Sums of the gaps of one CPU, by cause.
 #[derive(Clone, Copy, Debug, Default)]
 struct CpuGaps {
-    stood_still: Total,
-    another_ran: Total,
+    stood_still: GapTotal,
+    another_ran: GapTotal,
 }
 
 /// State shared by the spinning threads and the writer.
@@ -89,7 +89,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let (sender, gaps) = bounded(QUEUE);
     let began_ns = MonotonicClock.now().as_nanos();
     let mut table =
-        Table { file, rows: 0, seen: cpus.iter().map(|&cpu| (cpu, CpuGaps::default())).collect() };
+        Table { file, rows: 0, by_cpu: cpus.iter().map(|&cpu| (cpu, CpuGaps::default())).collect() };
     std::thread::scope(|scope| {
         let (ready, all_ready) = bounded(cpus.len());
         for &cpu in &cpus {
@@ -126,8 +126,8 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     })?;
     // A gap that was open at the end was recorded when its thread ran again.
     table.take(&gaps)?;
-    let Table { rows, seen, .. } = table;
-    print_sums(&seen, MonotonicClock.now().as_nanos() - began_ns);
+    let Table { rows, by_cpu, .. } = table;
+    print_sums(&by_cpu, MonotonicClock.now().as_nanos() - began_ns);
     let dropped = state.dropped.load(Ordering::Relaxed);
     if dropped > 0 {
         eprintln!("bench: warning: {dropped} gaps were seen and not kept: the queue to the writer was full");
@@ -195,7 +195,7 @@ impl SpinningThread {
 struct Table {
     file: LineFile,
     rows: u64,
-    seen: BTreeMap<usize, CpuGaps>,
+    by_cpu: BTreeMap<usize, CpuGaps>,
 }
 
 impl Table {
@@ -211,7 +211,7 @@ impl Table {
     fn take(&mut self, gaps: &Receiver<(usize, Gap)>) -> Result<(), ProbeError> {
         for (cpu, gap) in gaps.try_iter() {
             self.rows += 1;
-            let of_cpu = self.seen.entry(cpu).or_default();
+            let of_cpu = self.by_cpu.entry(cpu).or_default();
             if gap.another_ran { &mut of_cpu.another_ran } else { &mut of_cpu.stood_still }.add(&gap);
             if self.rows <= MOST_ROWS {
                 let Gap { from_ns, to_ns, another_ran } = gap;
@@ -224,14 +224,14 @@ impl Table {
     }
 }
 
-fn print_sums(seen: &BTreeMap<usize, CpuGaps>, length_ns: u64) {
-    let part = |total: &Total| {
+fn print_sums(by_cpu: &BTreeMap<usize, CpuGaps>, length_ns: u64) {
+    let part = |total: &GapTotal| {
         let share_percent = 100.0 * total.together_ns as f64 / length_ns.max(1) as f64;
         format!("{:>7}  {:>10.1}  {share_percent:>7.3}", total.count, total.longest_ns as f64 / 1e3)
     };
     say("       the CPU stood still             another thread ran");
     say("  CPU     gaps  longest us   time %       gaps  longest us   time %");
-    for (cpu, CpuGaps { stood_still, another_ran }) in seen {
+    for (cpu, CpuGaps { stood_still, another_ran }) in by_cpu {
         say(&format!("{cpu:>5}  {}    {}", part(stood_still), part(another_ran)));
     }
 }

@@ -45,7 +45,7 @@ use realtime::Interrupt;
 use runlog::conditions::Conditions;
 use runlog::process::Process;
 use runlog::run_folder::{CONDITIONS_JSON, FileError, SCHEMA_VERSION, write_json};
-use segment::{Common, End, Outcome};
+use segment::{EndReason, Outcome, SegmentContext};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -107,7 +107,7 @@ pub(crate) fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     keeping.soak.load_missing_because = load_missing_because;
     let soaking = SoakRun {
         plan: Plan { experiments: arguments.experiments.clone(), load: load.is_some(), loss },
-        common: Common { arguments, bin_dir, load: load.unwrap_or_default() },
+        context: SegmentContext { arguments, bin_dir, load: load.unwrap_or_default() },
         interrupt: Interrupt::watch().map_err(SoakError::Signals)?,
     };
     let (exit, because) = soaking.run(&mut keeping)?;
@@ -157,7 +157,7 @@ fn load(arguments: &SoakArguments) -> (Option<Vec<String>>, Option<String>) {
 
 struct SoakRun<'a> {
     plan: Plan,
-    common: Common<'a>,
+    context: SegmentContext<'a>,
     interrupt: Interrupt,
 }
 
@@ -179,15 +179,15 @@ impl SoakRun<'_> {
             };
             let (end, codes) = self.segment(keeping, rig_s)?;
             match end {
-                End::DiskFull(free_bytes) => {
+                EndReason::DiskFull(free_bytes) => {
                     let (free, out) = (free_bytes / 1_000_000, keeping.out.display());
                     let why = format!(
                         "the disk of {out} is nearly full, {free} MB are free: make room, or see --min-free-mb"
                     );
                     return Ok((Exit::BadInput, why));
                 }
-                End::Early(_) => early_in_a_row += 1,
-                End::TimeUp | End::Interrupted => early_in_a_row = 0,
+                EndReason::ProgramFailure(_) => early_in_a_row += 1,
+                EndReason::TimeUp | EndReason::Interrupted => early_in_a_row = 0,
             }
             if early_in_a_row >= GIVE_UP_AFTER {
                 let why = format!(
@@ -200,7 +200,11 @@ impl SoakRun<'_> {
     }
 
     /// Runs, judges and records one segment; returns how it ended and the exit codes of its programs.
-    fn segment(&self, keeping: &mut SoakFolder, rig_s: f64) -> Result<(End, Vec<Option<i32>>), SoakError> {
+    fn segment(
+        &self,
+        keeping: &mut SoakFolder,
+        rig_s: f64,
+    ) -> Result<(EndReason, Vec<Option<i32>>), SoakError> {
         let spec = self.plan.segment(keeping.next_number());
         let folder = keeping.out.join("segments").join(spec.folder());
         let (started_unix_s, began) = (unix_s(), Instant::now());
@@ -218,8 +222,8 @@ impl SoakRun<'_> {
                 );
             }
         };
-        let outcome = segment::run(&self.common, &spec, rig_s, &folder, &self.interrupt, &mut progress)?;
-        let load = spec.load.then(|| self.common.load.join(" "));
+        let outcome = segment::run(&self.context, &spec, rig_s, &folder, &self.interrupt, &mut progress)?;
+        let load = spec.load.then(|| self.context.load.join(" "));
         write_conditions(&folder, &spec, load.as_deref())?;
         let judged = judge::judge(&spec, &folder, &outcome, keeping.soak.settings.positions_judged);
         let unread = keeping.merged.add_segment(&folder);
@@ -250,7 +254,7 @@ impl SoakRun<'_> {
         }
         keeping.soak.segments.push(segment);
         let out = keeping.out.clone();
-        let SoakArguments { keep, keep_failed, .. } = self.common.arguments;
+        let SoakArguments { keep, keep_failed, .. } = self.context.arguments;
         rotate::rotate(&out, &mut keeping.soak.segments, *keep, *keep_failed)
             .map_err(|error| SoakError::output(&out, &error))?;
         keeping.soak.elapsed_s += began.elapsed().as_secs_f64();
@@ -260,7 +264,7 @@ impl SoakRun<'_> {
 }
 
 /// Writes the conditions that a latency report reads.
-fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Result<(), SoakError> {
+fn write_conditions(folder: &Path, spec: &plan::SegmentSpec, load: Option<&str>) -> Result<(), SoakError> {
     let path = folder.join(CONDITIONS_JSON);
     let conditions = Conditions {
         schema_version: SCHEMA_VERSION,
@@ -275,10 +279,12 @@ fn write_conditions(folder: &Path, spec: &plan::Spec, load: Option<&str>) -> Res
 
 fn end_text(outcome: &Outcome) -> String {
     match &outcome.end {
-        End::TimeUp => "its time was up".into(),
-        End::Interrupted => "interrupted".into(),
-        End::DiskFull(free_bytes) => format!("the disk was nearly full: {} MB free", free_bytes / 1_000_000),
-        End::Early(why) => why.clone(),
+        EndReason::TimeUp => "its time was up".into(),
+        EndReason::Interrupted => "interrupted".into(),
+        EndReason::DiskFull(free_bytes) => {
+            format!("the disk was nearly full: {} MB free", free_bytes / 1_000_000)
+        }
+        EndReason::ProgramFailure(why) => why.clone(),
     }
 }
 

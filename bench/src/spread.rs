@@ -8,7 +8,7 @@ use serde_json::{Map, Value, json};
 
 /// A figure over the runs that have it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-struct Spread {
+struct FigureStatistics {
     #[serde(rename = "n")]
     count: usize,
     mean: f64,
@@ -18,7 +18,7 @@ struct Spread {
     most: f64,
 }
 
-impl Spread {
+impl FigureStatistics {
     fn of(values: &[f64]) -> Option<Self> {
         let count = values.len();
         let (least, most) =
@@ -36,27 +36,27 @@ impl Spread {
     }
 }
 
-fn spreads(runs: &[Run]) -> Vec<(&'static str, &'static str, Spread)> {
-    let spread = |(name, unit)| {
+fn figure_statistics(runs: &[Run]) -> Vec<(&'static str, &'static str, FigureStatistics)> {
+    let statistics = |(name, unit)| {
         let values: Vec<_> = runs.iter().filter_map(|run| run.figure(name)).collect();
-        Some((name, unit, Spread::of(&values)?))
+        Some((name, unit, FigureStatistics::of(&values)?))
     };
-    rows().filter_map(spread).collect()
+    rows().filter_map(statistics).collect()
 }
 
 pub(crate) fn table(runs: &[Run]) -> Grid {
     let head = ["figure", "n", "mean", "standard deviation", "least", "most"];
-    let rows = spreads(runs).into_iter().map(|(name, unit, spread)| {
+    let rows = figure_statistics(runs).into_iter().map(|(name, unit, statistics)| {
         let reported = |value: f64| in_use(value, unit);
-        let deviation = spread.standard_deviation.map_or_else(|| "-".to_owned(), reported);
-        let count = spread.count.to_string();
+        let deviation = statistics.standard_deviation.map_or_else(|| "-".to_owned(), reported);
+        let count = statistics.count.to_string();
         vec![
             without_unit(name),
             count,
-            reported(spread.mean),
+            reported(statistics.mean),
             deviation,
-            reported(spread.least),
-            reported(spread.most),
+            reported(statistics.least),
+            reported(statistics.most),
         ]
     });
     Grid::new(head, rows)
@@ -64,8 +64,10 @@ pub(crate) fn table(runs: &[Run]) -> Grid {
 
 /// The spreads as JSON, SI, by the figures' names.
 pub(crate) fn json(runs: &[Run]) -> Value {
-    let figures: Map<_, _> =
-        spreads(runs).into_iter().map(|(name, _, spread)| (name.to_owned(), json!(spread))).collect();
+    let figures: Map<_, _> = figure_statistics(runs)
+        .into_iter()
+        .map(|(name, _, statistics)| (name.to_owned(), json!(statistics)))
+        .collect();
     let names: Vec<_> = runs.iter().map(|run| run.name.as_str()).collect();
     json!({
         "schema_version": runlog::run_folder::SCHEMA_VERSION,
@@ -82,12 +84,15 @@ mod tests {
 
     #[test]
     fn mean_and_deviation_are_those_of_the_sample() {
-        let spread = Spread::of(&[1.0, 2.0, 3.0, 6.0]).unwrap();
-        assert_eq!((spread.count, spread.mean, spread.least, spread.most), (4, 3.0, 1.0, 6.0));
-        assert!((spread.standard_deviation.unwrap() - (14.0_f64 / 3.0).sqrt()).abs() < 1e-15);
-        assert_eq!(Spread::of(&[4.0]).unwrap().standard_deviation, None);
-        assert_eq!(Spread::of(&[]), None);
-        let equal = Spread::of(&[0.1; 3]).unwrap();
+        let statistics = FigureStatistics::of(&[1.0, 2.0, 3.0, 6.0]).unwrap();
+        assert_eq!(
+            (statistics.count, statistics.mean, statistics.least, statistics.most),
+            (4, 3.0, 1.0, 6.0)
+        );
+        assert!((statistics.standard_deviation.unwrap() - (14.0_f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert_eq!(FigureStatistics::of(&[4.0]).unwrap().standard_deviation, None);
+        assert_eq!(FigureStatistics::of(&[]), None);
+        let equal = FigureStatistics::of(&[0.1; 3]).unwrap();
         assert_eq!((equal.mean, equal.standard_deviation), (0.1, Some(0.0)));
     }
 

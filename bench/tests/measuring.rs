@@ -41,9 +41,9 @@ fn a_cpu() -> usize {
 fn probe(table: &Path, gap_us: u64) -> Child {
     let line = format!("probe --gap-us {gap_us} --cpus {} --out {}", a_cpu(), table.display());
     let mut child = bench(&line).spawn().expect("the program starts");
-    let mut said = BufReader::new(child.stderr.take().expect("stderr is piped"));
+    let mut output = BufReader::new(child.stderr.take().expect("stderr is piped"));
     let mut first = String::new();
-    said.read_line(&mut first).expect("it says that it watches");
+    output.read_line(&mut first).expect("it says that it watches");
     assert!(first.contains("probe watches"), "{first}");
     child
 }
@@ -159,9 +159,9 @@ fn wrong_command_lines_are_refused_with_what_would_be_right() {
         ("ping-pong --bus vcan0", "can://IFACE"),
     ] {
         let ended = run(line);
-        let said = reported(&ended.stderr);
-        assert_eq!(ended.status.code(), Some(2), "{line}: {said}");
-        assert!(said.contains(hint), "{line}: {said}");
+        let output = reported(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(2), "{line}: {output}");
+        assert!(output.contains(hint), "{line}: {output}");
     }
 }
 
@@ -209,9 +209,9 @@ fn a_ping_pong_counts_each_ping_on_both_lines_and_adds_its_figures_to_one_file()
 fn a_bus_without_a_host_is_told_with_the_remedy_and_a_strange_file_stays() {
     let folder = tempfile::tempdir().unwrap();
     let ended = run(&format!("ping-pong {SHORT} --bus unix://{}/nobody", folder.path().display()));
-    let said = reported(&ended.stderr);
-    assert_eq!(ended.status.code(), Some(3), "{said}");
-    assert!(said.contains("emulator bus") && said.contains("which is down"), "{said}");
+    let output = reported(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(3), "{output}");
+    assert!(output.contains("emulator bus") && output.contains("which is down"), "{output}");
 
     let strange = folder.path().join("notes.json");
     std::fs::write(&strange, "precious").unwrap();

@@ -12,7 +12,7 @@ use axis_control::setup::{Inputs, Mode};
 use figures::record::{MEASURED, Record, TRUE};
 use figures::series::Series;
 use figures::tables_read::{StateSpan, Table, enter};
-use figures::thresholds::{self, ByRepetition, Found};
+use figures::thresholds::{self, ByRepetition, FigureValue};
 use figures::top::POSITIONS;
 use figures::{self, position, top};
 use plant::tables::{self, CycleRecord};
@@ -102,7 +102,7 @@ fn passed(
     let found = |key: &str| {
         let is_fault = || top::find(key).is_some_and(|figure| figure.kind == top::Kind::Fault);
         let measured = figures.get(key).and_then(Value::number);
-        measured.or_else(|| is_fault().then_some(0.0)).map(Found::Number)
+        measured.or_else(|| is_fault().then_some(0.0)).map(FigureValue::Number)
     };
     let judged = thresholds::judge(bounds, found, by_repetition).map_err(|error| error.to_string())?;
     Ok(Some(ended == EndState::Done && judged.values().all(|bound| bound.kept)))

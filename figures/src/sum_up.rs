@@ -3,9 +3,9 @@
 use crate::{SummaryError, join, picture, table};
 use std::path::Path;
 
-/// What is said of a run.
+/// A run's summary as it is printed, and its verdict.
 #[derive(Debug)]
-pub struct SummedUp {
+pub struct PrintedSummary {
     /// The short table, and the names of the files.
     pub text: String,
     /// Whether the run ended well and kept all its bounds.
@@ -17,7 +17,7 @@ pub struct SummedUp {
 /// # Errors
 ///
 /// A folder without a summary, files that cannot be read or written, a bound that makes no sense.
-pub fn sum_up(folder: &Path) -> Result<SummedUp, SummaryError> {
+pub fn sum_up(folder: &Path) -> Result<PrintedSummary, SummaryError> {
     let joined = join::join(folder)?;
     let pictures = picture::draw(folder, &joined.record)?;
     let others = if joined.is_rehearsal() { "" } else { "bus.log, " };
@@ -27,5 +27,5 @@ pub fn sum_up(folder: &Path) -> Result<SummedUp, SummaryError> {
         folder.display(),
         pictures.join(", ")
     );
-    Ok(SummedUp { text, passed: joined.passed() })
+    Ok(PrintedSummary { text, passed: joined.passed() })
 }

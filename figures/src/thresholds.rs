@@ -36,22 +36,22 @@ const WITH_PARTS: &[&str] = &[
     "axes",
 ];
 
-/// What a run has under a key.
+/// Value of a key of a run's summary.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Found {
+pub enum FigureValue {
     /// A number, in the key's unit.
     Number(f64),
-    /// The key is there, the run had nothing to measure.
+    /// Null: the run had nothing to measure.
     NotMeasured,
-    /// Something that has no bounds.
-    NoNumber,
+    /// No number, so that it has no bounds.
+    NonNumeric,
 }
 
-impl Found {
+impl FigureValue {
     fn of(value: &Value) -> Self {
         match value {
             Value::Null => Self::NotMeasured,
-            value => value.as_f64().map_or(Self::NoNumber, Self::Number),
+            value => value.as_f64().map_or(Self::NonNumeric, Self::Number),
         }
     }
 }
@@ -97,24 +97,24 @@ impl Bounds {
     }
 }
 
-/// Holds the bounds of `passed` against what is `found` under their keys: for each figure its bounds, value and whether they were
-/// kept.
+/// Compares the bounds of `passed` with the values that `value_of` returns for their keys; gives for each figure its bounds, its
+/// value and whether the bounds were kept.
 ///
 /// # Errors
 /// [`SummaryError::Threshold`]: a bound that makes no sense, or of a figure that no run has.
 pub fn judge(
     passed: &toml::Table,
-    found: impl Fn(&str) -> Option<Found>,
+    value_of: impl Fn(&str) -> Option<FigureValue>,
     by_repetition: &ByRepetition,
 ) -> Result<BTreeMap<String, JudgedBound>, SummaryError> {
     let judged = passed.iter().map(|(key, bound)| {
         let refused = |problem: &str| refusal(key, bound, problem);
         let bounds = Bounds::read(bound).map_err(refused)?;
-        let value = match found(key) {
+        let value = match value_of(key) {
             None if !is_known(key) => return Err(refused(NO_SUCH)),
-            None | Some(Found::NotMeasured) => None,
-            Some(Found::NoNumber) => return Err(refused("that key of summary.json is no number")),
-            Some(Found::Number(value)) => Some(value),
+            None | Some(FigureValue::NotMeasured) => None,
+            Some(FigureValue::NonNumeric) => return Err(refused("that key of summary.json is no number")),
+            Some(FigureValue::Number(value)) => Some(value),
         };
         let value = value.map(|worst| {
             let values = by_repetition.get(key).into_iter().flatten().flatten();
@@ -138,11 +138,11 @@ pub(crate) fn judge_summary(
 ) -> Result<BTreeMap<String, JudgedBound>, SummaryError> {
     // A bound's key is a path in the file.
     let written = in_order(summary);
-    let found = |key: &str| {
-        let of_family = || summary.figures.get(key).copied().map(Found::Number);
-        at(&written, key).map(Found::of).or_else(of_family)
+    let value_of = |key: &str| {
+        let of_family = || summary.figures.get(key).copied().map(FigureValue::Number);
+        at(&written, key).map(FigureValue::of).or_else(of_family)
     };
-    judge(passed, found, &summary.figures_by_repetition)
+    judge(passed, value_of, &summary.figures_by_repetition)
 }
 
 const NO_SUCH: &str =

@@ -13,19 +13,19 @@ struct Quantity {
     title: &'static str,
     of: fn(&Record) -> Series,
     /// Its set-point in the first run.
-    wanted: Option<fn(&Record) -> Series>,
+    set_point: Option<fn(&Record) -> Series>,
 }
 
 const QUANTITIES: &[Quantity] = &[
     Quantity {
         title: "drive position, mm",
         of: |record| record.measured.numbers("drive_position_m").map(|value| value * METRE_IN_MM),
-        wanted: Some(|record| record.drive.numbers("set_position_m").map(|value| value * METRE_IN_MM)),
+        set_point: Some(|record| record.drive.numbers("set_position_m").map(|value| value * METRE_IN_MM)),
     },
     Quantity {
         title: "drive set-point - position, mm",
         of: |record| record.position_error().map(|value| value * METRE_IN_MM),
-        wanted: None,
+        set_point: None,
     },
     Quantity {
         title: "load force, N",
@@ -36,12 +36,12 @@ const QUANTITIES: &[Quantity] = &[
                 Series::default()
             }
         },
-        wanted: Some(|record| record.load.numbers("set_force_N").clone()),
+        set_point: Some(|record| record.load.numbers("set_force_N").clone()),
     },
     Quantity {
         title: "drive valve opening, %",
         of: |record| record.measured.numbers("drive_valve").map(|value| value * PER_CENT),
-        wanted: None,
+        set_point: None,
     },
     Quantity {
         title: "load valve opening, %",
@@ -49,7 +49,7 @@ const QUANTITIES: &[Quantity] = &[
             let valve = record.measured.numbers("load_valve").map(|value| value * PER_CENT);
             if record.load_acts() { valve } else { Series::default() }
         },
-        wanted: None,
+        set_point: None,
     },
 ];
 
@@ -87,11 +87,11 @@ pub(super) fn whole(title: String, runs: &[Run], panels: Vec<Panel>) -> Picture 
 /// A panel for each quantity; time 0 of each run is its `zero_s`.
 fn panels(runs: &[Run], zero_s: impl Fn(&Run) -> f64) -> Vec<Panel> {
     let panel = |quantity: &Quantity| {
-        let wanted = quantity.wanted.zip(runs.first()).map(|(wanted, first)| Curve {
+        let set_point = quantity.set_point.zip(runs.first()).map(|(set_point, first)| Curve {
             name: "set-point".into(),
             colour: BLACK,
             width: 1,
-            samples: wanted(&first.record).shifted(-zero_s(first)),
+            samples: set_point(&first.record).shifted(-zero_s(first)),
         });
         let curves = runs.iter().enumerate().map(|(place, run)| Curve {
             name: run.name.clone(),
@@ -99,7 +99,7 @@ fn panels(runs: &[Run], zero_s: impl Fn(&Run) -> f64) -> Vec<Panel> {
             width: if place == 0 { 2 } else { 1 },
             samples: (quantity.of)(&run.record).shifted(-zero_s(run)),
         });
-        Panel { title: quantity.title.into(), curves: wanted.into_iter().chain(curves).collect() }
+        Panel { title: quantity.title.into(), curves: set_point.into_iter().chain(curves).collect() }
     };
     QUANTITIES.iter().map(panel).collect()
 }

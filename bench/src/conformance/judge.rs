@@ -4,7 +4,7 @@
 //! `docs/buses.md`.
 
 use super::cli::{CheckPace, ConformanceArguments};
-use super::observer::{MalformedCommand, ObservedFrame, Received};
+use super::observer::{MalformedCommand, ObservedFrame, ReceivedFrame};
 use crate::junit::Case;
 use crate::soak::model::{Check, CheckResult};
 use protocol::commands::STALE_AFTER_CYCLES;
@@ -26,19 +26,19 @@ pub(super) struct Phase<'a> {
     /// Cycles whose sensors were sent, with their stamps; `None` where this process disturbed the timing.
     pub(super) cycles: &'a [(u64, Option<u64>)],
     /// Frames received in them.
-    pub(super) received: &'a [Received],
+    pub(super) received: &'a [ReceivedFrame],
 }
 
 impl Phase<'_> {
-    fn commands(&self) -> impl Iterator<Item = (&Received, f64, Option<u64>, Option<u8>)> {
+    fn commands(&self) -> impl Iterator<Item = (&ReceivedFrame, f64, Option<u64>, Option<u8>)> {
         self.received.iter().filter_map(|received| match received.frame {
             ObservedFrame::Command { opening, age, step } => Some((received, opening, age, step)),
             _ => None,
         })
     }
 
-    fn broken(&self, wrong: MalformedCommand) -> usize {
-        self.received.iter().filter(|received| received.frame == ObservedFrame::Broken(wrong)).count()
+    fn malformed(&self, wrong: MalformedCommand) -> usize {
+        self.received.iter().filter(|received| received.frame == ObservedFrame::Malformed(wrong)).count()
     }
 }
 
@@ -64,9 +64,9 @@ pub(super) fn regular(phase: &Phase<'_>, arguments: &ConformanceArguments) -> Ve
         ("reserved-bits", MalformedCommand::Reserved, "bits that no signal covers"),
         ("range", MalformedCommand::Range, "an opening beyond -2047 to 2047 counts"),
     ] {
-        let broken = phase.broken(wrong);
-        let detail = format!("{broken} commands with {what}, {commands} good ones");
-        cases.push(case("regular", name, kept(broken == 0 && commands > 0), detail));
+        let malformed = phase.malformed(wrong);
+        let detail = format!("{malformed} commands with {what}, {commands} good ones");
+        cases.push(case("regular", name, kept(malformed == 0 && commands > 0), detail));
     }
     cases.extend([counter(phase), command_age(phase), identifiers(phase)]);
     cases.extend(timing(phase, arguments));
@@ -179,10 +179,10 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     let us = |ns: Option<u64>| ns.map_or("none".into(), |ns| format!("{:.1}", ns as f64 / 1000.0));
     let mean_ns = (!periods.is_empty()).then(|| periods.iter().sum::<u64>() / periods.len() as u64);
     let disturbed = phase.cycles.iter().filter(|(_, stamp)| stamp.is_none()).count();
-    let beside = format!("{disturbed} cycles left out, in which this machine held the check up");
+    let left_out = format!("{disturbed} cycles left out, in which this machine held the check up");
     let spread = quantile(&spreads, MOST);
     let cycle_time = format!(
-        "mean {} us, 99 % within {} us of 1 ms ({} are allowed), largest deviation {} us; {beside}",
+        "mean {} us, 99 % within {} us of 1 ms ({} are allowed), largest deviation {} us; {left_out}",
         us(mean_ns),
         us(spread),
         arguments.spread_us,
@@ -190,7 +190,7 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     );
     let response = quantile(&responses, MOST);
     let answered = format!(
-        "from sensors to command: median {} us, 99 % within {} us ({} are allowed), longest {} us; {beside}",
+        "from sensors to command: median {} us, 99 % within {} us ({} are allowed), longest {} us; {left_out}",
         us(quantile(&responses, 0.5)),
         us(response),
         arguments.response_us,
@@ -203,20 +203,23 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     ]
 }
 
-fn during<'a>(received: &'a [Received], window: &'a Range<u64>) -> impl Iterator<Item = &'a Received> {
+fn during<'a>(
+    received: &'a [ReceivedFrame],
+    window: &'a Range<u64>,
+) -> impl Iterator<Item = &'a ReceivedFrame> {
     received.iter().filter(|received| window.contains(&received.cycle))
 }
 
 /// Last cycle with an open valve within a window; `None` when it stayed shut.
-fn last_open(received: &[Received], window: Range<u64>) -> Option<u64> {
-    let open = |received: &&Received| {
+fn last_open(received: &[ReceivedFrame], window: Range<u64>) -> Option<u64> {
+    let open = |received: &&ReceivedFrame| {
         window.contains(&received.cycle)
             && matches!(received.frame, ObservedFrame::Command { opening, .. } if opening != 0.0)
     };
     received.iter().rev().find(open).map(|received| received.cycle)
 }
 
-fn valve_shut(class: &str, received: &[Received], window: Range<u64>, within: u64) -> Case {
+fn valve_shut(class: &str, received: &[ReceivedFrame], window: Range<u64>, within: u64) -> Case {
     let began = window.start;
     let last = last_open(received, window.clone());
     let after = last.map_or(0, |cycle| cycle - began + 1);
@@ -228,13 +231,13 @@ fn valve_shut(class: &str, received: &[Received], window: Range<u64>, within: u6
 }
 
 /// After an emergency stop the valve is shut, and stays shut while the stop lasts.
-pub(super) fn emergency_stop(received: &[Received], window: Range<u64>) -> Vec<Case> {
+pub(super) fn emergency_stop(received: &[ReceivedFrame], window: Range<u64>) -> Vec<Case> {
     vec![valve_shut("emergency-stop", received, window, STOP_WITHIN_CYCLES)]
 }
 
 /// Without sensors the controller shuts the valve and may trip the emergency stop. It sends no command with an invented echo,
 /// then or when the sensors are `back`.
-pub(super) fn sensor_loss(received: &[Received], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
+pub(super) fn sensor_loss(received: &[ReceivedFrame], window: Range<u64>, back: Range<u64>) -> Vec<Case> {
     let class = "sensor-loss";
     let [without, again] = [&window, &back].map(|window| {
         during(received, window)

@@ -23,7 +23,7 @@ pub(super) enum ObservedFrame {
         step: Option<u8>,
     },
     /// A command that the rig rejects.
-    Broken(MalformedCommand),
+    Malformed(MalformedCommand),
     Stop(EmergencyStop),
     /// Another frame that the controller may send.
     Permitted,
@@ -45,7 +45,7 @@ pub(super) enum MalformedCommand {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Received {
+pub(super) struct ReceivedFrame {
     /// The newest cycle that had been sent.
     pub(super) cycle: u64,
     pub(super) stamp_ns: u64,
@@ -59,7 +59,7 @@ pub(super) struct Observer {
     /// By cycle: whether the sensors of the axis were sent.
     sent: Vec<bool>,
     last_alive: Option<u8>,
-    pub(super) received: Vec<Received>,
+    pub(super) received: Vec<ReceivedFrame>,
     /// The opening in effect.
     pub(super) opening: f64,
 }
@@ -89,7 +89,7 @@ impl Observer {
         if self.received.len() < MOST_FRAMES {
             let frame = self.judge(frame);
             let cycle = (self.sent.len() as u64).saturating_sub(1);
-            self.received.push(Received { cycle, stamp_ns, frame });
+            self.received.push(ReceivedFrame { cycle, stamp_ns, frame });
         }
     }
 
@@ -118,18 +118,18 @@ impl Observer {
     fn judge_command(&mut self, frame: &CanFrame) -> ObservedFrame {
         let data = frame.data();
         if data.len() != usize::from(self.command.length) {
-            return ObservedFrame::Broken(MalformedCommand::Length);
+            return ObservedFrame::Malformed(MalformedCommand::Length);
         }
         let (crc, before) = data.split_last().expect("a command has five bytes");
         if checksum::of(self.command.id, before) != *crc {
-            return ObservedFrame::Broken(MalformedCommand::Checksum);
+            return ObservedFrame::Malformed(MalformedCommand::Checksum);
         }
         let command = match Frame::decode(frame) {
             Ok(Frame::DriveValveCommand(command) | Frame::LoadValveCommand(command)) => command,
             Err(DecodeError::ReservedBits { .. }) => {
-                return ObservedFrame::Broken(MalformedCommand::Reserved);
+                return ObservedFrame::Malformed(MalformedCommand::Reserved);
             }
-            _ => return ObservedFrame::Broken(MalformedCommand::Range),
+            _ => return ObservedFrame::Malformed(MalformedCommand::Range),
         };
         let modulo = ALIVE_RANGE as u8;
         let step = self.last_alive.replace(command.alive);
@@ -199,7 +199,7 @@ mod tests {
             MalformedCommand::Reserved,
             MalformedCommand::Range,
         ]
-        .map(ObservedFrame::Broken);
+        .map(ObservedFrame::Malformed);
         assert_eq!(judged(&frames), expected);
     }
 

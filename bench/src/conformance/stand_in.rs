@@ -36,7 +36,7 @@ pub(super) struct Disturbance {
     pub(super) skipped: u64,
 }
 
-pub(super) struct StandIn {
+pub(super) struct RigStandIn {
     axis: CheckedAxis,
     lockstep: bool,
     /// Positions of drive and load, in rig coordinates.
@@ -45,7 +45,7 @@ pub(super) struct StandIn {
     skipped: u64,
 }
 
-impl StandIn {
+impl RigStandIn {
     pub(super) fn new(axis: CheckedAxis, lockstep: bool) -> Self {
         Self { axis, lockstep, positions_m: [0.1, 0.5], velocity_m_per_s: 0.0, skipped: 0 }
     }
@@ -61,27 +61,27 @@ impl StandIn {
             lockstep: self.lockstep,
             ending: false,
         };
-        let mut say =
+        let mut send =
             |frame: Frame| frames.push(frame.encode().expect("the stand-in stays within the ranges"));
         if disturbance.skipped > 0 {
-            say(Frame::Tick(tick));
+            send(Frame::Tick(tick));
         }
         if let Some(since) = disturbance.stopped_since
             && (cycle - since).is_multiple_of(periods::EMERGENCY_STOP_CYCLES)
         {
             let stop = EmergencyStop { reason: EmergencyStopReason::Operator, release: false };
-            say(Frame::ConsoleEmergencyStop(stop));
+            send(Frame::ConsoleEmergencyStop(stop));
         }
         for axis in [CheckedAxis::Drive, CheckedAxis::Load] {
             if axis != self.axis || !disturbance.sensors_lost {
-                say(self.sensors(axis, cycle));
+                send(self.sensors(axis, cycle));
             }
         }
         if disturbance.skipped == 0 && periods::tick_is_due(cycle) {
-            say(Frame::Tick(tick));
+            send(Frame::Tick(tick));
         }
         if periods::status_is_due(cycle) {
-            say(Frame::RigStatus(RigStatus {
+            send(Frame::RigStatus(RigStatus {
                 supply_pressure_pa: 7e5,
                 linked: self.axis == CheckedAxis::Load,
                 emergency_stop: disturbance.stopped_since.is_some(),
@@ -108,10 +108,10 @@ impl StandIn {
         *position_m = (*position_m + sign * self.velocity_m_per_s * CYCLE_S).clamp(0.0, STROKE_M);
     }
 
-    /// Moves the carriage by `way_m`, within its stroke.
-    pub(super) fn push(&mut self, way_m: f64) {
+    /// Moves the carriage by `distance_m`, within its stroke.
+    pub(super) fn push(&mut self, distance_m: f64) {
         let position_m = &mut self.positions_m[usize::from(self.axis == CheckedAxis::Load)];
-        *position_m += if *position_m > STROKE_M / 2.0 { -way_m } else { way_m };
+        *position_m += if *position_m > STROKE_M / 2.0 { -distance_m } else { distance_m };
     }
 
     fn sensors(&self, axis: CheckedAxis, cycle: u64) -> Frame {

@@ -53,8 +53,8 @@ pub(super) fn write(
         return Err(failed("it has no python-can".into()));
     }
     if !done.status.success() {
-        let said = String::from_utf8_lossy(&done.stderr);
-        return Err(failed(said.lines().last().unwrap_or("it failed").to_owned()));
+        let output = String::from_utf8_lossy(&done.stderr);
+        return Err(failed(output.lines().last().unwrap_or("it failed").to_owned()));
     }
     let reported = String::from_utf8_lossy(&done.stdout).trim().to_owned();
     Ok((reported != format!("equal {}", log.frames.len())).then_some(reported))

@@ -8,7 +8,7 @@ use std::io::{self, Write};
 
 /// Time axis of the rows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Rows {
+pub(super) struct TimeAxis {
     /// Stamp of time 0, ns.
     pub(super) origin_ns: u64,
     /// Time between two rows; `None` for a row for each stamp.
@@ -16,7 +16,7 @@ pub(super) struct Rows {
 }
 
 /// Writes the table; returns its number of rows.
-pub(super) fn write(out: &mut impl Write, signals: &Signals, rows: Rows) -> io::Result<u64> {
+pub(super) fn write(out: &mut impl Write, signals: &Signals, axis: TimeAxis) -> io::Result<u64> {
     write!(out, "time_s")?;
     for message in &signals.messages {
         for signal in message.spec.signals {
@@ -24,9 +24,9 @@ pub(super) fn write(out: &mut impl Write, signals: &Signals, rows: Rows) -> io::
         }
     }
     writeln!(out)?;
-    match rows.every_ms {
-        Some(every_ms) => held(out, signals, rows.origin_ns, u64::from(every_ms) * 1_000_000),
-        None => as_stamped(out, signals, rows.origin_ns),
+    match axis.every_ms {
+        Some(every_ms) => held(out, signals, axis.origin_ns, u64::from(every_ms) * 1_000_000),
+        None => as_stamped(out, signals, axis.origin_ns),
     }
 }
 
@@ -138,7 +138,7 @@ mod tests {
 
     fn columns(every_ms: Option<u32>, origin_ns: u64) -> Vec<[String; 3]> {
         let mut out = Vec::new();
-        let rows = write(&mut out, &signals(), Rows { origin_ns, every_ms }).unwrap();
+        let rows = write(&mut out, &signals(), TimeAxis { origin_ns, every_ms }).unwrap();
         let text = String::from_utf8(out).unwrap();
         let head: Vec<_> = text.lines().next().unwrap().split(',').map(str::to_owned).collect();
         let place = |name: &str| head.iter().position(|column| column.starts_with(name)).unwrap();

@@ -45,59 +45,61 @@ pub(super) enum Refusal {
 
 /// State of the parser.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Place {
+enum ParserState {
     #[default]
     Between,
     Inside,
-    PassingOver,
+    Skipping,
 }
 
 /// Incremental parser.
 #[derive(Clone, Debug)]
 pub(super) struct Parser {
-    place: Place,
+    state: ParserState,
     bytes: [u8; LONGEST_REQUEST],
     length: usize,
 }
 
 impl Default for Parser {
     fn default() -> Self {
-        Self { place: Place::default(), bytes: [0; LONGEST_REQUEST], length: 0 }
+        Self { state: ParserState::default(), bytes: [0; LONGEST_REQUEST], length: 0 }
     }
 }
 
 impl Parser {
     /// Takes the next byte; returns the request that it completes.
     pub(super) fn push(&mut self, byte: u8) -> Option<Result<Request, Refusal>> {
-        match (self.place, byte) {
-            (Place::Between, b'<') => {
-                (self.place, self.length) = (Place::Inside, 0);
+        match (self.state, byte) {
+            (ParserState::Between, b'<') => {
+                (self.state, self.length) = (ParserState::Inside, 0);
                 None
             }
-            (Place::Between, byte) => (!byte.is_ascii_whitespace()).then_some(Err(Refusal::NotTheProtocol)),
-            (Place::Inside, b'>') => {
-                self.place = Place::Between;
+            (ParserState::Between, byte) => {
+                (!byte.is_ascii_whitespace()).then_some(Err(Refusal::NotTheProtocol))
+            }
+            (ParserState::Inside, b'>') => {
+                self.state = ParserState::Between;
                 Some(read(&self.bytes[..self.length]))
             }
             // The request before was incomplete: a new one begins.
-            (Place::Inside, b'<') => {
+            (ParserState::Inside, b'<') => {
                 self.length = 0;
                 Some(Err(Refusal::Malformed))
             }
-            (Place::Inside, _) if self.length == LONGEST_REQUEST => {
-                self.place = Place::PassingOver;
+            (ParserState::Inside, _) if self.length == LONGEST_REQUEST => {
+                self.state = ParserState::Skipping;
                 Some(Err(Refusal::TooLong))
             }
-            (Place::Inside, byte) => {
+            (ParserState::Inside, byte) => {
                 self.bytes[self.length] = byte;
                 self.length += 1;
                 None
             }
-            (Place::PassingOver, b'>') => {
-                self.place = Place::Between;
+            (ParserState::Skipping, b'>') => {
+                self.state = ParserState::Between;
                 None
             }
-            (Place::PassingOver, _) => None,
+            (ParserState::Skipping, _) => None,
         }
     }
 }

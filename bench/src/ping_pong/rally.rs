@@ -1,6 +1,6 @@
 //! The two sides: one sends at a fixed period and measures, the other answers at once.
 
-use super::line::{Disconnected, Line};
+use super::transport::{Disconnected, FrameTransport};
 use protocol::can::CanFrame;
 use realtime::{Clock, Instant, Interrupt, Recorder};
 use std::time::Duration;
@@ -23,7 +23,7 @@ pub(super) struct PingPongResult {
     pub(super) skipped: u64,
     /// From before sending until the answer was read, ns.
     pub(super) round_trip_ns: Recorder,
-    /// From before sending until the answer's arrival at our queue, ns, where the line reports it.
+    /// From before sending until the answer's arrival at our queue, ns, where the transport reports it.
     pub(super) to_arrival_ns: Recorder,
 }
 
@@ -36,7 +36,7 @@ pub(super) struct PingSchedule {
 
 /// Waits for the first answer; false without one.
 pub(super) fn serve(
-    line: &mut dyn Line,
+    transport: &mut dyn FrameTransport,
     clock: &impl Clock,
     interrupt: &Interrupt,
 ) -> Result<bool, Disconnected> {
@@ -44,10 +44,10 @@ pub(super) fn serve(
     while clock.now() < until && !interrupt.came() {
         let again = clock.now() + TRY_PERIOD;
         // Attempts, since a bus may not exist yet.
-        line.send(&ping(0));
+        transport.send(&ping(0));
         let mut answered = false;
         while clock.now() < again && !answered {
-            line.wait(&mut |frame, _| answered |= answers(frame, 0))?;
+            transport.wait(&mut |frame, _| answered |= answers(frame, 0))?;
         }
         if answered {
             return Ok(true);
@@ -58,7 +58,7 @@ pub(super) fn serve(
 
 /// Sends pings as scheduled, or until interrupted.
 pub(super) fn ask(
-    line: &mut dyn Line,
+    transport: &mut dyn FrameTransport,
     clock: &impl Clock,
     schedule: PingSchedule,
     interrupt: &Interrupt,
@@ -72,7 +72,7 @@ pub(super) fn ask(
         clock.wait_until(due);
         rally.sent += 1;
         // Number 0 was the first attempt.
-        if let Some((read, arrived_ns)) = exchange(line, clock, rally.sent, interrupt)? {
+        if let Some((read, arrived_ns)) = exchange(transport, clock, rally.sent, interrupt)? {
             rally.answered += 1;
             rally.round_trip_ns.record(read.0);
             if let Some(arrived_ns) = arrived_ns {
@@ -88,14 +88,14 @@ pub(super) fn ask(
 }
 
 /// Answers until the other side has ended or is silent for `silence`.
-pub(super) fn answer(line: &mut dyn Line, clock: &impl Clock, silence: Duration) {
+pub(super) fn answer(transport: &mut dyn FrameTransport, clock: &impl Clock, silence: Duration) {
     let mut received = clock.now();
     loop {
         // Answered after the batch is taken, as the controller does; there is one ping at a time.
         let mut asked = None;
-        let waited = line.wait(&mut |frame, _| asked = number(frame, PING_ID).or(asked));
+        let waited = transport.wait(&mut |frame, _| asked = number(frame, PING_ID).or(asked));
         if let Some(number) = asked {
-            line.send(&CanFrame::new(PONG_ID, &number.to_le_bytes()));
+            transport.send(&CanFrame::new(PONG_ID, &number.to_le_bytes()));
             received = clock.now();
         }
         if waited.is_err() || clock.now().saturating_duration_since(received) > silence {
@@ -108,16 +108,16 @@ pub(super) fn answer(line: &mut dyn Line, clock: &impl Clock, silence: Duration)
 type RoundTrip = ((u64, u64), Option<u64>);
 
 fn exchange(
-    line: &mut dyn Line,
+    transport: &mut dyn FrameTransport,
     clock: &impl Clock,
     number: u64,
     interrupt: &Interrupt,
 ) -> Result<Option<RoundTrip>, Disconnected> {
     let sent = clock.now();
-    line.send(&ping(number));
+    transport.send(&ping(number));
     loop {
         let mut answer = None;
-        line.wait(&mut |frame, arrived_ns| {
+        transport.wait(&mut |frame, arrived_ns| {
             if answers(frame, number) {
                 answer = Some(arrived_ns);
             }
@@ -147,15 +147,15 @@ fn number(frame: &CanFrame, id: u16) -> Option<u64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::line::OnSocket;
+    use super::super::transport::SocketTransport;
     use super::*;
     use realtime::MonotonicClock;
     use rustix::net::{AddressFamily, SocketFlags, SocketType, socketpair};
 
-    fn pair() -> [OnSocket; 2] {
+    fn pair() -> [SocketTransport; 2] {
         let (a, b) =
             socketpair(AddressFamily::UNIX, SocketType::SEQPACKET, SocketFlags::CLOEXEC, None).unwrap();
-        [a, b].map(|socket| OnSocket::new(socket).unwrap())
+        [a, b].map(|socket| SocketTransport::new(socket).unwrap())
     }
 
     const SCHEDULE: PingSchedule = PingSchedule { interval: Duration::from_millis(1), pings: 50 };

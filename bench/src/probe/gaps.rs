@@ -63,13 +63,13 @@ impl GapWatch {
 
 /// Sum of the gaps of one kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Total {
+pub(super) struct GapTotal {
     pub count: u64,
     pub longest_ns: u64,
     pub together_ns: u64,
 }
 
-impl Total {
+impl GapTotal {
     pub(super) fn add(&mut self, gap: &Gap) {
         let length_ns = gap.to_ns - gap.from_ns;
         self.count += 1;
@@ -135,10 +135,10 @@ mod tests {
 
     #[test]
     fn totals_add_up() {
-        let mut total = Total::default();
+        let mut total = GapTotal::default();
         for (from_ns, to_ns) in [(0, 200_000), (500_000, 1_000_000)] {
             total.add(&Gap { from_ns, to_ns, another_ran: false });
         }
-        assert_eq!(total, Total { count: 2, longest_ns: 500_000, together_ns: 700_000 });
+        assert_eq!(total, GapTotal { count: 2, longest_ns: 500_000, together_ns: 700_000 });
     }
 }

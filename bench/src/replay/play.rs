@@ -17,9 +17,10 @@ const LEAD: Duration = Duration::from_millis(20);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum End {
+pub(super) enum EndReason {
     /// After the last frame.
-    Whole,
+    #[serde(rename = "whole")]
+    Completed,
     /// By Ctrl-C or SIGTERM.
     Interrupted,
     /// A rig started that the log would have disturbed.
@@ -27,7 +28,7 @@ pub(super) enum End {
 }
 
 pub(super) struct ReplayStatistics {
-    pub(super) end: End,
+    pub(super) end: EndReason,
     /// Frames that the bus accepted.
     pub(super) sent: u64,
     /// Frames that it did not accept.
@@ -37,11 +38,11 @@ pub(super) struct ReplayStatistics {
 
 /// Number of waiting frames of a rig; they are of another node, since no peer receives its frames.
 pub(super) fn take_rig_frames(bus: &mut dyn Bus) -> u64 {
-    let mut heard = 0;
+    let mut rig_frames = 0;
     while let Received::Frame(frame, _) = bus.receive() {
-        heard += u64::from(Kind::of(&frame) == Kind::Rig);
+        rig_frames += u64::from(Kind::of(&frame) == Kind::Rig);
     }
-    heard
+    rig_frames
 }
 
 /// Sends the whole schedule.
@@ -52,7 +53,8 @@ pub(super) fn play(
     spin: Duration,
     interrupt: &Interrupt,
 ) -> ReplayStatistics {
-    let mut played = ReplayStatistics { end: End::Whole, sent: 0, dropped: 0, error_ns: Recorder::new() };
+    let mut played =
+        ReplayStatistics { end: EndReason::Completed, sent: 0, dropped: 0, error_ns: Recorder::new() };
     let start = clock.now() + LEAD;
     let disturbs = schedule.disturbs_a_rig();
     for next in &schedule.frames {
@@ -80,14 +82,14 @@ fn wait(
     due: Instant,
     disturbs: bool,
     interrupt: &Interrupt,
-) -> Option<End> {
+) -> Option<EndReason> {
     loop {
         if interrupt.came() {
-            return Some(End::Interrupted);
+            return Some(EndReason::Interrupted);
         }
         // Frames of others are always taken: a full queue would hide a rig.
         if take_rig_frames(bus) > 0 && disturbs {
-            return Some(End::LiveRig);
+            return Some(EndReason::LiveRig);
         }
         let now = clock.now();
         if now >= due {

@@ -12,7 +12,7 @@ use std::time::Duration;
 pub(super) const LONGEST: Duration = Duration::from_secs(7 * 24 * 3600);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Due {
+pub(super) struct ScheduledFrame {
     /// Since the first frame of the log, ns.
     pub(super) after_ns: u64,
     pub(super) frame: CanFrame,
@@ -21,7 +21,7 @@ pub(super) struct Due {
 /// The frames to send, and counts of the others.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Schedule {
-    pub(super) frames: Vec<Due>,
+    pub(super) frames: Vec<ScheduledFrame>,
     /// Left out on request.
     pub(super) left_out: u64,
     pub(super) error_frames: u64,
@@ -34,13 +34,13 @@ pub(super) struct Schedule {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct TooLong {
+pub(super) struct LogTooLong {
     /// Line of the first frame beyond the limit.
     pub(super) line: u64,
 }
 
 impl Schedule {
-    pub(super) fn of(log: &RecordedLog, leave_out: &[Exclusion]) -> Result<Self, TooLong> {
+    pub(super) fn of(log: &RecordedLog, leave_out: &[Exclusion]) -> Result<Self, LogTooLong> {
         let first_ns = log.frames[0].record.stamp_ns;
         let mut schedule = Self::default();
         let mut newest_ns = first_ns;
@@ -50,7 +50,7 @@ impl Schedule {
             newest_ns = newest_ns.max(stamp_ns);
             let after_ns = newest_ns - first_ns;
             if u128::from(after_ns) > LONGEST.as_nanos() {
-                return Err(TooLong { line: logged.line });
+                return Err(LogTooLong { line: logged.line });
             }
             let kind = Kind::of(&frame);
             if kind == Kind::Error {
@@ -60,7 +60,7 @@ impl Schedule {
             } else {
                 schedule.commands += u64::from(kind == Kind::Command);
                 schedule.of_the_rig += u64::from(kind == Kind::Rig);
-                schedule.frames.push(Due { after_ns, frame });
+                schedule.frames.push(ScheduledFrame { after_ns, frame });
             }
         }
         Ok(schedule)
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
     use runlog::candump::LogReader;
 
-    fn schedule(text: &str, leave_out: &[Exclusion]) -> Result<Schedule, TooLong> {
+    fn schedule(text: &str, leave_out: &[Exclusion]) -> Result<Schedule, LogTooLong> {
         let frames = LogReader::new(text.as_bytes()).map(Result::unwrap).collect();
         let log = RecordedLog {
             file: "a.log".into(),
@@ -113,6 +113,6 @@ mod tests {
     #[test]
     fn a_log_that_jumps_by_years_is_refused_by_its_line() {
         let text = "(5.0) a 7F0#\n(18446744073.0) a 7F0#\n";
-        assert_eq!(schedule(text, &[]).unwrap_err(), TooLong { line: 2 });
+        assert_eq!(schedule(text, &[]).unwrap_err(), LogTooLong { line: 2 });
     }
 }

@@ -124,7 +124,7 @@ pub(super) struct Participant {
     /// Frames of any identifier dropped by the kernel at its queue; SocketCAN only.
     pub overflow: u64,
     /// Counters of the host; `None` without a host.
-    pub seen: Option<PeerCounts>,
+    pub host_counts: Option<PeerCounts>,
     /// Gaps by identifier, where frames have counters.
     pub gaps: BTreeMap<String, Gaps>,
 }
@@ -170,7 +170,7 @@ pub(crate) struct Row {
 }
 
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Account {
+pub(super) struct FrameAccount {
     /// Each identifier at each receiver.
     pub rows: Vec<Row>,
     /// Contradictions of the account, a sentence each; empty when it balances.
@@ -190,48 +190,51 @@ impl Row {
 }
 
 /// Computes the account; `wire` is that of the embedded bus.
-pub(super) fn close(parties: &[Participant], wire: Option<&Wire>) -> Account {
-    let mut account = Account::default();
-    let senders = senders(parties, wire);
+pub(super) fn close(participants: &[Participant], wire: Option<&Wire>) -> FrameAccount {
+    let mut account = FrameAccount::default();
+    let senders = senders(participants, wire);
     if let Some(wire) = wire {
-        check_host(parties, wire, &senders, &mut account.broken);
+        check_host(participants, wire, &senders, &mut account.broken);
     }
-    for party in parties {
+    for participant in participants {
         let first_row = account.rows.len();
-        for (id, (sender, sent)) in senders.iter().filter(|(id, _)| party.sent.of(id) == 0) {
-            let seen = party.seen.clone().unwrap_or_default();
-            let refused = parties.iter().map(|party| party.refused.of(id)).sum::<u64>();
+        for (id, (sender, sent)) in senders.iter().filter(|(id, _)| participant.sent.of(id) == 0) {
+            let host_counts = participant.host_counts.clone().unwrap_or_default();
+            let refused = participants.iter().map(|participant| participant.refused.of(id)).sum::<u64>();
             account.rows.push(Row {
                 id: id.clone(),
                 sender: sender.clone(),
-                receiver: party.name.clone(),
+                receiver: participant.name.clone(),
                 sent: *sent,
                 refused_at_sender: refused,
-                received: party.received.of(id),
+                received: participant.received.of(id),
                 lost_on_wire: wire.map_or(0, |wire| wire.injected.of(id) + wire.never_sent.of(id)),
-                lost_at_queue: seen.dropped.of(id) + seen.missed_in_bus_off.of(id),
-                before_it_came: seen.before.of(id),
-                after_it_left: seen.after.of(id),
-                missing_by_gaps: party.gaps.get(id).map(|gaps| gaps.missing(*sent + refused)),
-                pauses: party.gaps.get(id).map_or(0, Gaps::pauses),
+                lost_at_queue: host_counts.dropped.of(id) + host_counts.missed_in_bus_off.of(id),
+                before_it_came: host_counts.before.of(id),
+                after_it_left: host_counts.after.of(id),
+                missing_by_gaps: participant.gaps.get(id).map(|gaps| gaps.missing(*sent + refused)),
+                pauses: participant.gaps.get(id).map_or(0, Gaps::pauses),
             });
         }
         let rows = &mut account.rows[first_row..];
         if wire.is_none() {
-            take_overflow(party, rows, &mut account.broken);
+            take_overflow(participant, rows, &mut account.broken);
         }
         check_rows(rows, &mut account.broken, &mut account.gaps_broken);
-        for id in party.received.ids().filter(|id| !senders.contains_key(*id)) {
-            account.broken.push(format!("{} received {id}, which nobody has sent", party.name));
+        for id in participant.received.ids().filter(|id| !senders.contains_key(*id)) {
+            account.broken.push(format!("{} received {id}, which nobody has sent", participant.name));
         }
     }
     account
 }
 
-fn senders(parties: &[Participant], wire: Option<&Wire>) -> BTreeMap<String, (String, u64)> {
+fn senders(participants: &[Participant], wire: Option<&Wire>) -> BTreeMap<String, (String, u64)> {
     let mut senders: BTreeMap<String, (String, u64)> = BTreeMap::new();
-    let strangers = wire.map_or(&[][..], |wire| &wire.others).iter().map(|seen| ("another", &seen.taken));
-    for (name, sent) in parties.iter().map(|party| (party.name.as_str(), &party.sent)).chain(strangers) {
+    let strangers =
+        wire.map_or(&[][..], |wire| &wire.others).iter().map(|host_counts| ("another", &host_counts.taken));
+    for (name, sent) in
+        participants.iter().map(|participant| (participant.name.as_str(), &participant.sent)).chain(strangers)
+    {
         for id in sent.ids() {
             let entry = senders.entry(id.clone()).or_insert_with(|| (name.to_owned(), 0));
             entry.1 += sent.of(id);
@@ -245,24 +248,31 @@ fn senders(parties: &[Participant], wire: Option<&Wire>) -> BTreeMap<String, (St
 
 /// Checks the host's counters for consistency before they are compared with others.
 fn check_host(
-    parties: &[Participant],
+    participants: &[Participant],
     wire: &Wire,
     senders: &BTreeMap<String, (String, u64)>,
     broken: &mut Vec<String>,
 ) {
-    for party in parties {
-        let Some(seen) = &party.seen else {
-            broken.push(format!("the host never saw {}", party.name));
+    for participant in participants {
+        let Some(host_counts) = &participant.host_counts else {
+            broken.push(format!("the host never saw {}", participant.name));
             continue;
         };
-        let ids: BTreeSet<_> = party.sent.ids().chain(seen.taken.ids()).collect();
-        for id in ids.into_iter().filter(|id| party.sent.of(id) != seen.taken.of(id)) {
-            let (sent, taken) = (party.sent.of(id), seen.taken.of(id));
-            broken.push(format!("{id}: {} sent {sent}, the host took {taken}", party.name));
+        let ids: BTreeSet<_> = participant.sent.ids().chain(host_counts.taken.ids()).collect();
+        for id in ids.into_iter().filter(|id| participant.sent.of(id) != host_counts.taken.of(id)) {
+            let (sent, taken) = (participant.sent.of(id), host_counts.taken.of(id));
+            broken.push(format!("{id}: {} sent {sent}, the host took {taken}", participant.name));
         }
-        for id in seen.delivered.ids().filter(|id| seen.delivered.of(id) != party.received.of(id)) {
-            let (delivered, received) = (seen.delivered.of(id), party.received.of(id));
-            broken.push(format!("{id}: {} received {received}, the host delivered {delivered}", party.name));
+        for id in host_counts
+            .delivered
+            .ids()
+            .filter(|id| host_counts.delivered.of(id) != participant.received.of(id))
+        {
+            let (delivered, received) = (host_counts.delivered.of(id), participant.received.of(id));
+            broken.push(format!(
+                "{id}: {} received {received}, the host delivered {delivered}",
+                participant.name
+            ));
         }
     }
     for (id, (_, sent)) in senders {
@@ -274,12 +284,12 @@ fn check_host(
 }
 
 /// Distributes the overflow of the kernel, which has no identifiers: the sum must equal all missing frames.
-fn take_overflow(party: &Participant, rows: &mut [Row], broken: &mut Vec<String>) {
+fn take_overflow(participant: &Participant, rows: &mut [Row], broken: &mut Vec<String>) {
     let missing: i128 = rows.iter().map(Row::missing).sum();
-    if missing == i128::from(party.overflow) && rows.iter().all(|row| row.missing() >= 0) {
+    if missing == i128::from(participant.overflow) && rows.iter().all(|row| row.missing() >= 0) {
         rows.iter_mut().for_each(|row| row.lost_at_queue = row.sent - row.received);
     } else {
-        let (name, overflow) = (&party.name, party.overflow);
+        let (name, overflow) = (&participant.name, participant.overflow);
         broken.push(format!("{name} misses {missing} frames in all, its queue dropped {overflow}"));
     }
 }

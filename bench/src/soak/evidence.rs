@@ -1,10 +1,10 @@
 //! Reads what a segment left in its folder: reports of its programs, the frame log, and the peers of the bus.
 
 use super::EMULATOR;
-use super::account::{self, Account, Counts, Gaps, Participant, PeerCounts, Wire};
+use super::account::{self, Counts, FrameAccount, Gaps, Participant, PeerCounts, Wire};
 use super::frame_log::{self, FrameLog, known_name};
 use super::model::Figures;
-use super::plan::Spec;
+use super::plan::SegmentSpec;
 use super::segment::Outcome;
 use protocol::bus::host::HostReport;
 use runlog::Axis;
@@ -55,7 +55,7 @@ pub(super) fn counts(by_name: impl IntoIterator<Item = (String, u64)>) -> Counts
 }
 
 impl SegmentFiles {
-    pub(super) fn read(spec: &Spec, folder: &Path) -> Self {
+    pub(super) fn read(spec: &SegmentSpec, folder: &Path) -> Self {
         let controllers = Process::controllers(spec.two_processes).iter();
         let controllers = controllers.map(|process| (process.name(), folder.join(process.report())));
         let (summary, run) = (folder.join(SUMMARY_JSON), folder.join(RUN_JSON));
@@ -79,7 +79,7 @@ impl SegmentFiles {
     ///
     /// # Errors
     /// A sentence with the damaged file, the missing report, or the duplicate peer.
-    pub(super) fn account(&self, outcome: &Outcome) -> Result<Account, String> {
+    pub(super) fn account(&self, outcome: &Outcome) -> Result<FrameAccount, String> {
         if let Some(damaged) = self.damaged.first() {
             return Err(format!("no account: {damaged}"));
         }
@@ -88,19 +88,19 @@ impl SegmentFiles {
         if let Some(name) = names.next() {
             return Err(format!("no account: {name} left no report"));
         }
-        let mut parties = vec![self.rig()];
-        parties.extend(self.controllers.iter().map(|(name, reported)| self.controller(name, reported)));
+        let mut participants = vec![self.rig()];
+        participants.extend(self.controllers.iter().map(|(name, reported)| self.controller(name, reported)));
         let Some(host) = &self.summary.bus_host else {
-            let mut account = account::close(&parties, None);
-            let sent: u64 = parties.iter().map(|party| party.sent.total()).sum();
+            let mut account = account::close(&participants, None);
+            let sent: u64 = participants.iter().map(|participant| participant.sent.total()).sum();
             if let Some(by_interface) = outcome.sent_by_interface.filter(|by_interface| *by_interface != sent)
             {
                 account.broken.push(format!("{sent} frames sent, the interface counted {by_interface}"));
             }
             return Ok(account);
         };
-        let wire = self.wire(host, outcome, &mut parties)?;
-        Ok(account::close(&parties, Some(&wire)))
+        let wire = self.wire(host, outcome, &mut participants)?;
+        Ok(account::close(&participants, Some(&wire)))
     }
 
     fn rig(&self) -> Participant {
@@ -111,7 +111,7 @@ impl SegmentFiles {
             let pauses = commands.expired + commands.refused_stale + commands.breaks;
             Some(((*id).to_owned(), Gaps::Commands { lost: commands.lost, first, last, pauses }))
         });
-        Participant { gaps: gaps.collect(), ..self.party(EMULATOR) }
+        Participant { gaps: gaps.collect(), ..self.participant(EMULATOR) }
     }
 
     /// Assigns each peer of the host to its process.
@@ -119,7 +119,7 @@ impl SegmentFiles {
         &self,
         host: &HostReport,
         outcome: &Outcome,
-        parties: &mut [Participant],
+        participants: &mut [Participant],
     ) -> Result<Wire, String> {
         let mut wire = Wire {
             injected: counts(host.injected_loss.by_name()),
@@ -131,7 +131,7 @@ impl SegmentFiles {
             wire.never_sent.add_all(&counts(node.dropped_in_bus_off.by_name()));
         }
         for peer in &host.peers {
-            let seen = PeerCounts {
+            let host_counts = PeerCounts {
                 taken: counts(peer.received_by_id.by_name()),
                 before: counts(peer.before_it_came.by_name()),
                 delivered: counts(peer.delivered.by_name()),
@@ -139,16 +139,16 @@ impl SegmentFiles {
                 missed_in_bus_off: counts(peer.missed_in_bus_off.by_name()),
                 after: counts(peer.after_it_left.by_name()),
             };
-            let is_of = |party: &&mut Participant| {
-                let pid = outcome.exits.get(&party.name).map(|(pid, ..)| format!("process {pid}"));
+            let is_of = |participant: &&mut Participant| {
+                let pid = outcome.exits.get(&participant.name).map(|(pid, ..)| format!("process {pid}"));
                 pid.as_ref() == Some(&peer.name)
             };
-            match parties.iter_mut().find(is_of) {
-                Some(party) if party.seen.is_some() => {
-                    return Err(format!("no account: {} lost the bus and came back", party.name));
+            match participants.iter_mut().find(is_of) {
+                Some(participant) if participant.host_counts.is_some() => {
+                    return Err(format!("no account: {} lost the bus and came back", participant.name));
                 }
-                Some(party) => party.seen = Some(seen),
-                None => wire.others.push(seen),
+                Some(participant) => participant.host_counts = Some(host_counts),
+                None => wire.others.push(host_counts),
             }
         }
         Ok(wire)
@@ -175,7 +175,7 @@ impl SegmentFiles {
         self.controllers.values().find_map(|reported| reported.axes.get("drive"))
     }
 
-    fn party(&self, name: &str) -> Participant {
+    fn participant(&self, name: &str) -> Participant {
         let bus = self.reports.get(name).and_then(|report| report.bus).unwrap_or_default();
         Participant {
             name: name.into(),
@@ -194,7 +194,7 @@ impl SegmentFiles {
             let (lost, before) = (axis.sensors_lost?, axis.sensors_missed_before_first_tick?);
             Some((id.to_owned(), Gaps::Sensors { lost, before }))
         });
-        Participant { gaps: gaps.collect(), ..self.party(name) }
+        Participant { gaps: gaps.collect(), ..self.participant(name) }
     }
 }
 
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn a_damaged_report_is_named_and_a_missing_one_is_not_damaged() {
         let folder = tempfile::tempdir().unwrap();
-        let spec = Spec::default();
+        let spec = SegmentSpec::default();
         std::fs::write(folder.path().join("controller.json"), "{}").unwrap();
         assert!(SegmentFiles::read(&spec, folder.path()).damaged.is_empty());
 

@@ -1,13 +1,13 @@
 //! Judges a finished segment: reads its files, computes the account, makes every check.
 
 use super::EMULATOR;
-use super::account::{self, Account};
+use super::account::{self, FrameAccount};
 use super::evidence::{SegmentFiles, counts};
 use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
 use super::model::{Check, CheckResult, Figures};
-use super::plan::Spec;
-use super::segment::{End, Outcome};
-use figures::thresholds::{self, ByRepetition, Found};
+use super::plan::SegmentSpec;
+use super::segment::{EndReason, Outcome};
+use figures::thresholds::{self, ByRepetition, FigureValue};
 use figures::top::POSITIONS;
 use runlog::summary::{JudgedBound, ProcessReport};
 use serde_json::{Value, json};
@@ -21,13 +21,18 @@ const LOSS_DEVIATIONS: f64 = 5.0;
 pub(super) struct SegmentVerdict {
     pub checks: Vec<Check>,
     pub figures: Figures,
-    pub account: Account,
+    pub account: FrameAccount,
     pub memory: BTreeMap<String, Memory>,
     /// `machine` of `run.json`.
     pub machine: Value,
 }
 
-pub(super) fn judge(spec: &Spec, folder: &Path, outcome: &Outcome, judge_positions: bool) -> SegmentVerdict {
+pub(super) fn judge(
+    spec: &SegmentSpec,
+    folder: &Path,
+    outcome: &Outcome,
+    judge_positions: bool,
+) -> SegmentVerdict {
     let evidence = SegmentFiles::read(spec, folder);
     let account = evidence.account(outcome);
     let memory: BTreeMap<_, _> =
@@ -66,7 +71,7 @@ fn result(name: &str, broken: &[String], good: impl Fn() -> String) -> Check {
 
 fn processes(outcome: &Outcome) -> Check {
     // Stopped by a signal, the rig exits with 130 after saving everything.
-    let asked = matches!(outcome.end, End::Interrupted | End::DiskFull(_));
+    let asked = matches!(outcome.end, EndReason::Interrupted | EndReason::DiskFull(_));
     let as_expected =
         |name: &str, code: Option<i32>| code == Some(0) || (asked && name == EMULATOR && code == Some(130));
     let mut broken: Vec<_> = outcome
@@ -75,13 +80,13 @@ fn processes(outcome: &Outcome) -> Check {
         .filter(|(name, (_, code, _))| !as_expected(name, *code))
         .map(|(name, (_, _, words))| format!("{name}: {words}, see {name}.txt"))
         .collect();
-    if let End::Early(why) = &outcome.end {
+    if let EndReason::ProgramFailure(why) = &outcome.end {
         broken.insert(0, why.clone());
     }
     result("processes", &broken, || "all programs ended as they should".into())
 }
 
-fn account_summary(account: &Account) -> String {
+fn account_summary(account: &FrameAccount) -> String {
     let sum = |part: fn(&account::Row) -> u64| account.rows.iter().map(part).sum::<u64>();
     format!(
         "{} frames for {} pairs of identifier and receiver: {} received, {} lost on the wire on purpose, {} lost at queues, \
@@ -96,7 +101,7 @@ fn account_summary(account: &Account) -> String {
 }
 
 /// Checks the rate of the injected loss; whether every lost frame was found is checked by the account and the gaps.
-fn loss(spec: &Spec, evidence: &SegmentFiles, account: &Account) -> Check {
+fn loss(spec: &SegmentSpec, evidence: &SegmentFiles, account: &FrameAccount) -> Check {
     let host = evidence.summary.bus_host.as_ref();
     let injected = host.map_or(0, |host| host.injected_loss.total());
     let Some(loss) = spec.loss else {
@@ -200,7 +205,7 @@ fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
             &format!("no bound to judge: {}", json!(measured)),
         );
     }
-    let found = |key: &str| measured.get(key).copied().map(Found::Number);
+    let found = |key: &str| measured.get(key).copied().map(FigureValue::Number);
     match thresholds::judge(&bounds, found, &ByRepetition::new()) {
         Err(error) => Check::new("positions", CheckResult::Failed, &error.to_string()),
         Ok(judged) => {

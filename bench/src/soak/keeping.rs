@@ -4,7 +4,7 @@
 //! `soak.json` is the one that the others are made of, and the one that a soak goes on from. Each appears by being renamed.
 
 use super::SoakError;
-use super::merged::Merged;
+use super::merged::MergedHistograms;
 use super::model::{SOAK_SCHEMA_VERSION, Segment, Settings, Soak, Totals};
 use super::{junit, procfs, verdict};
 use runlog::run_folder::{FileError, read_json, write_json, write_whole};
@@ -16,7 +16,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 pub(super) struct SoakFolder {
     pub soak: Soak,
-    pub merged: Merged,
+    pub merged: MergedHistograms,
     pub out: PathBuf,
     /// Lock on the folder, held for the life of the process.
     _lock: File,
@@ -60,7 +60,8 @@ impl SoakFolder {
         if !differences.is_empty() && !anyway {
             return Err(SoakError::OtherSettings { out: out.into(), differences: differences.join("; ") });
         }
-        let merged = Merged::from_kept(&soak.distributions).map_err(|error| FileError::read(&path, error))?;
+        let merged = MergedHistograms::from_kept(&soak.distributions)
+            .map_err(|error| FileError::read(&path, error))?;
         (soak.settings, soak.planned_s, soak.ended_because) = (settings, planned_s, None);
         let mut keeping = Self { soak, merged, out: out.into(), _lock: lock };
         keeping.find_cut_off()?;

@@ -17,7 +17,7 @@ use std::path::Path;
 use std::time::Duration;
 
 #[derive(Clone, Default)]
-pub(super) struct Merged(BTreeMap<String, Histogram<u64>>);
+pub(super) struct MergedHistograms(BTreeMap<String, Histogram<u64>>);
 
 /// A distribution in `soak.json`: percentiles, and the histogram from which a later start goes on.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -34,7 +34,7 @@ pub(crate) struct StoredDistribution {
     pub hdr_v2_base64: String,
 }
 
-impl Merged {
+impl MergedHistograms {
     /// Adds the histograms of a segment's folder; returns the files that cannot be read.
     pub(super) fn add_segment(&mut self, folder: &Path) -> Vec<String> {
         let mut unread = Vec::new();
@@ -129,16 +129,16 @@ mod tests {
     #[test]
     fn segments_add_up_also_across_a_restart() {
         let (one, other) = (segment(&[1000; 98]), segment(&[5000, 70_000_000]));
-        let mut merged = Merged::default();
+        let mut merged = MergedHistograms::default();
         assert!(merged.add_segment(one.path()).is_empty());
-        let mut merged = Merged::from_kept(&merged.keep().unwrap()).unwrap();
+        let mut merged = MergedHistograms::from_kept(&merged.keep().unwrap()).unwrap();
         assert!(merged.add_segment(other.path()).is_empty());
         let kept = &merged.keep().unwrap()["emulator-wakeup"];
         assert_eq!((kept.count, kept.p50_ns), (100, 1000));
         assert!((4995..=5005).contains(&kept.p99_ns) && kept.max_ns >= 70_000_000, "{kept:?}");
         let path = one.path().join("soak.hlog");
         merged.write(&path, 1e9, Duration::from_secs(2)).unwrap();
-        let mut read = Merged::default();
+        let mut read = MergedHistograms::default();
         read.add_log(&path).unwrap();
         assert_eq!(read.keep().unwrap(), merged.keep().unwrap());
     }
@@ -149,7 +149,7 @@ mod tests {
         let path = folder.path().join("emulator.hlog");
         let text = std::fs::read_to_string(&path).unwrap();
         std::fs::write(&path, format!("{text}Tag=half,0.000,1.0")).unwrap();
-        let mut merged = Merged::default();
+        let mut merged = MergedHistograms::default();
         assert!(merged.add_segment(folder.path()).is_empty());
         assert_eq!(merged.keep().unwrap().len(), 1);
         std::fs::write(&path, text.replace("HIST", "hist")).unwrap();

@@ -3,7 +3,7 @@
 use super::account::Row;
 use super::memory::Memory;
 use super::merged::StoredDistribution;
-use super::plan::Spec;
+use super::plan::SegmentSpec;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -104,7 +104,7 @@ pub(crate) struct Totals {
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Segment {
-    pub spec: Spec,
+    pub spec: SegmentSpec,
     /// Its folder below the soak's.
     pub folder: String,
     /// Start, s since 1970.
@@ -179,7 +179,7 @@ impl Segment {
     /// A segment that was interrupted by the death of the soak.
     pub(crate) fn cut_off(number: u32, experiment: &str, folder: &str) -> Self {
         Self {
-            spec: Spec { number, experiment: experiment.into(), ..Spec::default() },
+            spec: SegmentSpec { number, experiment: experiment.into(), ..SegmentSpec::default() },
             folder: folder.into(),
             ended: "the soak was killed while it ran; its rows stay in its folder".into(),
             ..Self::default()

@@ -21,7 +21,7 @@ const WAYS: u32 = 4;
 const AROUND_S: f64 = 2.5;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Spec {
+pub(crate) struct SegmentSpec {
     /// Its number, from 1.
     pub number: u32,
     pub experiment: String,
@@ -43,11 +43,11 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub(super) fn segment(&self, number: u32) -> Spec {
+    pub(super) fn segment(&self, number: u32) -> SegmentSpec {
         let place = number - 1;
         let count = self.experiments.len() as u32;
         let way = (place + place / least_common_multiple(count, WAYS)) % WAYS;
-        Spec {
+        SegmentSpec {
             number,
             experiment: self.experiments[(place % count) as usize].clone(),
             two_processes: matches!(way, 1 | 2),
@@ -57,7 +57,7 @@ impl Plan {
     }
 }
 
-impl Spec {
+impl SegmentSpec {
     pub(crate) fn folder(&self) -> String {
         format!("{:04}-{}", self.number, self.experiment)
     }
@@ -106,25 +106,25 @@ mod tests {
     fn every_experiment_is_run_every_way() {
         for count in 1..=13 {
             let plan = plan(count);
-            let seen: BTreeSet<_> = (1..=count as u32 * 16)
+            let specs: BTreeSet<_> = (1..=count as u32 * 16)
                 .map(|number| plan.segment(number))
                 .map(|spec| (spec.experiment, spec.two_processes, spec.load, spec.loss.is_some()))
                 .collect();
-            assert_eq!(seen.len(), count * 4, "{count} experiments");
+            assert_eq!(specs.len(), count * 4, "{count} experiments");
         }
     }
 
     #[test]
     fn the_first_four_segments_are_the_four_ways() {
-        let seen: Vec<_> = (1..=4).map(|number| plan(5).segment(number)).collect();
+        let specs: Vec<_> = (1..=4).map(|number| plan(5).segment(number)).collect();
         let ways: Vec<_> =
-            seen.iter().map(|spec| (spec.two_processes, spec.load, spec.loss.is_some())).collect();
+            specs.iter().map(|spec| (spec.two_processes, spec.load, spec.loss.is_some())).collect();
         assert_eq!(
             ways,
             [(false, false, false), (true, true, false), (true, false, true), (false, true, false)]
         );
-        assert_eq!(seen[2].folder(), "0003-e2");
-        assert_eq!(seen[2].description(), "two controllers, 1 % loss");
+        assert_eq!(specs[2].folder(), "0003-e2");
+        assert_eq!(specs[2].description(), "two controllers, 1 % loss");
     }
 
     #[test]

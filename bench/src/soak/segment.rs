@@ -6,7 +6,7 @@
 
 use super::cli::SoakArguments;
 use super::memory::Sample;
-use super::plan::Spec;
+use super::plan::SegmentSpec;
 use super::processes::{RunningProgram, end_in_words};
 use super::procfs;
 use super::{EMULATOR, SoakError};
@@ -30,7 +30,7 @@ const LISTEN_TIMEOUT: Duration = Duration::from_secs(20);
 const SAVE_TIMEOUT: Duration = Duration::from_secs(20);
 
 /// Properties common to all segments of a soak.
-pub(super) struct Common<'a> {
+pub(super) struct SegmentContext<'a> {
     pub arguments: &'a SoakArguments,
     pub bin_dir: PathBuf,
     /// Command line of the load generator, program first; empty without one.
@@ -38,19 +38,19 @@ pub(super) struct Common<'a> {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum End {
+pub(super) enum EndReason {
     TimeUp,
     /// The soak was asked to end.
     Interrupted,
     /// The disk is nearly full: free bytes.
     DiskFull(u64),
-    /// A program ended early, or did not end.
-    Early(String),
+    /// A program ended early or did not end; the reason in words.
+    ProgramFailure(String),
 }
 
 /// Results of a segment besides its files.
 pub(super) struct Outcome {
-    pub end: End,
+    pub end: EndReason,
     /// Process number, exit code (`None` after a signal) and end in words of each program, by name.
     pub exits: BTreeMap<String, (u32, Option<i32>, String)>,
     pub memory: BTreeMap<String, Vec<Sample>>,
@@ -63,30 +63,30 @@ pub(super) type Progress<'a> = dyn FnMut(f64) + 'a;
 
 /// Runs a segment of `rig_s` in `folder`, which is created.
 pub(super) fn run(
-    common: &Common<'_>,
-    spec: &Spec,
+    context: &SegmentContext<'_>,
+    spec: &SegmentSpec,
     rig_s: f64,
     folder: &Path,
     interrupt: &Interrupt,
     progress: &mut Progress<'_>,
 ) -> Result<Outcome, SoakError> {
     std::fs::create_dir_all(folder).map_err(|error| SoakError::output(folder, &error))?;
-    let interface = common.arguments.bus.interface();
+    let interface = context.arguments.bus.interface();
     let sent_before = interface.and_then(procfs::sent_by_interface);
-    let start = Start { common, spec, folder };
-    let mut running = start.controllers()?;
-    let load = if spec.load { start.load()? } else { None };
-    running.insert(0, start.emulator(rig_s)?);
-    let mut watch = Watch { began: Instant::now(), samples: 0, memory: BTreeMap::new() };
-    let end = watch.until_the_end(
+    let launcher = SegmentLauncher { context, spec, folder };
+    let mut running = launcher.controllers()?;
+    let load = if spec.load { launcher.load()? } else { None };
+    running.insert(0, launcher.emulator(rig_s)?);
+    let mut monitor = ProcessMonitor { began: Instant::now(), samples: 0, memory: BTreeMap::new() };
+    let end = monitor.wait_for_end(
         &mut running,
         rig_s,
-        |free| free < common.arguments.min_free_mb * 1_000_000,
+        |free| free < context.arguments.min_free_mb * 1_000_000,
         interrupt,
         progress,
         folder,
     );
-    if end != End::TimeUp {
+    if end != EndReason::TimeUp {
         // The rig's last tick ends the controllers after they received everything; so the rig ends first.
         running[0].interrupt();
         running[0].wait_until(Instant::now() + SAVE_TIMEOUT / 2);
@@ -105,19 +105,20 @@ pub(super) fn run(
     drop(load);
     let sent_after = interface.and_then(procfs::sent_by_interface);
     let sent_by_interface = sent_before.zip(sent_after).map(|(before, after)| after.saturating_sub(before));
-    Ok(Outcome { end, exits, memory: watch.memory, sent_by_interface })
+    Ok(Outcome { end, exits, memory: monitor.memory, sent_by_interface })
 }
 
-struct Start<'a> {
-    common: &'a Common<'a>,
-    spec: &'a Spec,
+/// Starts the programs of a segment.
+struct SegmentLauncher<'a> {
+    context: &'a SegmentContext<'a>,
+    spec: &'a SegmentSpec,
     folder: &'a Path,
 }
 
-impl Start<'_> {
+impl SegmentLauncher<'_> {
     /// The bus of this segment; the seed is its number, so that losses differ between segments.
     fn bus(&self) -> BusUrl {
-        let mut bus = self.common.arguments.bus.clone();
+        let mut bus = self.context.arguments.bus.clone();
         if let (BusUrl::Unix { wire, .. }, Some(loss)) = (&mut bus, self.spec.loss) {
             (wire.loss, wire.seed) = (loss, u64::from(self.spec.number));
         }
@@ -125,7 +126,7 @@ impl Start<'_> {
     }
 
     fn program(&self, name: &str, program: &str, more: Vec<OsString>) -> Result<RunningProgram, SoakError> {
-        let (path, asked) = (self.common.bin_dir.join(program), self.common.arguments);
+        let (path, asked) = (self.context.bin_dir.join(program), self.context.arguments);
         let experiment = asked.experiment_folder.join(format!("{}.toml", self.spec.experiment));
         let mut arguments: Vec<OsString> = vec!["run".into(), "--bus".into(), self.bus().to_string().into()];
         for (option, value) in [("--rig", &asked.rig), ("--experiment", &experiment)] {
@@ -137,25 +138,25 @@ impl Start<'_> {
     }
 
     fn start(&self, name: &str, path: &Path, arguments: &[OsString]) -> Result<RunningProgram, SoakError> {
-        let said = self.folder.join(format!("{name}.txt"));
-        RunningProgram::start(name, path, arguments, &said)
+        let output = self.folder.join(format!("{name}.txt"));
+        RunningProgram::start(name, path, arguments, &output)
             .map_err(|error| SoakError::Program { program: path.into(), reason: error.to_string() })
     }
 
     fn emulator(&self, rig_s: f64) -> Result<RunningProgram, SoakError> {
         let mut more: Vec<OsString> = vec!["--seconds".into(), rig_s.to_string().into()];
-        more.extend(self.common.arguments.emulator_options.split_whitespace().map(Into::into));
+        more.extend(self.context.arguments.emulator_options.split_whitespace().map(Into::into));
         self.program(EMULATOR, "emulator", more)
     }
 
     fn controllers(&self) -> Result<Vec<RunningProgram>, SoakError> {
-        let interface = self.common.arguments.bus.interface();
+        let interface = self.context.arguments.bus.interface();
         let before = interface.and_then(procfs::listeners);
         let mut controllers = Vec::new();
         for process in Process::controllers(self.spec.two_processes) {
             let axis = if let Process::ControllerOf(axis) = process { axis.name() } else { "both" };
             let mut more: Vec<OsString> = vec!["--axis".into(), axis.into(), "--repeat".into()];
-            more.extend(self.common.arguments.controller_options.split_whitespace().map(Into::into));
+            more.extend(self.context.arguments.controller_options.split_whitespace().map(Into::into));
             controllers.push(self.program(process.name(), "controller", more)?);
         }
         if let Some((interface, before)) = interface.zip(before) {
@@ -169,22 +170,22 @@ impl Start<'_> {
     }
 
     fn load(&self) -> Result<Option<RunningProgram>, SoakError> {
-        let Some((program, arguments)) = self.common.load.split_first() else { return Ok(None) };
+        let Some((program, arguments)) = self.context.load.split_first() else { return Ok(None) };
         let arguments: Vec<OsString> = arguments.iter().map(Into::into).collect();
         self.start("load", Path::new(program), &arguments).map(Some)
     }
 }
 
 /// Samples taken while programs run.
-struct Watch {
+struct ProcessMonitor {
     began: Instant,
     samples: usize,
     memory: BTreeMap<String, Vec<Sample>>,
 }
 
-impl Watch {
+impl ProcessMonitor {
     /// Waits until the emulator, the first of `running`, has ended, or the segment ends early.
-    fn until_the_end(
+    fn wait_for_end(
         &mut self,
         running: &mut [RunningProgram],
         rig_s: f64,
@@ -192,32 +193,35 @@ impl Watch {
         interrupt: &Interrupt,
         progress: &mut Progress<'_>,
         folder: &Path,
-    ) -> End {
+    ) -> EndReason {
         let latest = self.began + Duration::from_secs_f64(rig_s) + SAVE_TIMEOUT;
         loop {
             if self.began.elapsed() >= SAMPLE_PERIOD * self.samples as u32 {
                 self.sample(running);
                 if let Some(free) = procfs::free_bytes(folder).filter(|free| too_full(*free)) {
-                    return End::DiskFull(free);
+                    return EndReason::DiskFull(free);
                 }
                 progress(self.began.elapsed().as_secs_f64());
             }
             if interrupt.came() {
-                return End::Interrupted;
+                return EndReason::Interrupted;
             }
             let gone: Vec<_> =
                 running.iter_mut().filter_map(|one| (!one.is_running()).then(|| one.name.clone())).collect();
             let in_time = self.began.elapsed().as_secs_f64() >= rig_s;
             if gone.iter().any(|name| name == EMULATOR) && in_time {
-                return End::TimeUp;
+                return EndReason::TimeUp;
             }
             // Controllers receive the last tick slightly before the rig ends.
             if !gone.is_empty() && !in_time {
                 let after_s = self.began.elapsed().as_secs_f64();
-                return End::Early(format!("{} ended after {after_s:.1} of {rig_s} s", gone.join(" and ")));
+                return EndReason::ProgramFailure(format!(
+                    "{} ended after {after_s:.1} of {rig_s} s",
+                    gone.join(" and ")
+                ));
             }
             if Instant::now() > latest {
-                return End::Early("the emulator did not end in time".into());
+                return EndReason::ProgramFailure("the emulator did not end in time".into());
             }
             std::thread::sleep(POLL_PERIOD);
         }

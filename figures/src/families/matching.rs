@@ -36,8 +36,8 @@ mod tests {
 
     #[test]
     fn offset_and_what_is_left_are_told() {
-        let seen = each_ms(0.0, 2.0, |time| 0.3008 - if time < 1.0 { 0.0 } else { 0.00075 });
-        let mut load = table(&[("position_m", &seen)]);
+        let position_m = each_ms(0.0, 2.0, |time| 0.3008 - if time < 1.0 { 0.0 } else { 0.00075 });
+        let mut load = table(&[("position_m", &position_m)]);
         load.set_states("matching_chain", chain(&[("averaging", 0.0), ("matched", 1.0), ("", 2.0)]));
         let measured = table(&[
             ("load_position_m", &each_ms(0.0, 2.0, |_| 0.3008)),

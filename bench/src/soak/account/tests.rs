@@ -9,7 +9,7 @@ fn whole() -> (Vec<Participant>, Wire) {
         name: "emulator".into(),
         sent: Counts::from([("120", 1000), ("130", 100)]),
         received: Counts::from([("110", 994)]),
-        seen: Some(PeerCounts {
+        host_counts: Some(PeerCounts {
             taken: Counts::from([("120", 1000), ("130", 100)]),
             delivered: Counts::from([("110", 994)]),
             after: Counts::from([("110", 1)]),
@@ -23,7 +23,7 @@ fn whole() -> (Vec<Participant>, Wire) {
         name: "controller".into(),
         sent: Counts::from([("110", 996)]),
         received: Counts::from([("120", 994), ("130", 100)]),
-        seen: Some(PeerCounts {
+        host_counts: Some(PeerCounts {
             taken: Counts::from([("110", 996)]),
             before: Counts::from([("120", 3)]),
             delivered: Counts::from([("120", 994), ("130", 100)]),
@@ -41,10 +41,10 @@ fn whole() -> (Vec<Participant>, Wire) {
     (vec![rig, controller], wire)
 }
 
-fn broken(change: impl Fn(&mut Vec<Participant>, &mut Wire)) -> Account {
-    let (mut parties, mut wire) = whole();
-    change(&mut parties, &mut wire);
-    close(&parties, Some(&wire))
+fn broken(change: impl Fn(&mut Vec<Participant>, &mut Wire)) -> FrameAccount {
+    let (mut participants, mut wire) = whole();
+    change(&mut participants, &mut wire);
+    close(&participants, Some(&wire))
 }
 
 #[test]
@@ -58,7 +58,8 @@ fn a_whole_account_names_every_missing_frame_both_ways() {
 
 #[test]
 fn one_frame_too_few_at_a_receiver_breaks_it() {
-    let account = broken(|parties, _| parties[1].received = Counts::from([("120", 993), ("130", 100)]));
+    let account =
+        broken(|participants, _| participants[1].received = Counts::from([("120", 993), ("130", 100)]));
     assert_eq!(account.broken.len(), 2, "{account:?}");
     assert!(account.broken[1].contains("120: emulator sent 1000, controller received 993"), "{account:?}");
     assert_eq!(account.gaps_broken.len(), 1, "{account:?}");
@@ -66,7 +67,7 @@ fn one_frame_too_few_at_a_receiver_breaks_it() {
 
 #[test]
 fn a_frame_that_never_reached_the_host_breaks_it() {
-    let account = broken(|parties, _| parties[1].sent = Counts::from([("110", 997)]));
+    let account = broken(|participants, _| participants[1].sent = Counts::from([("110", 997)]));
     assert!(account.broken[0].contains("110: controller sent 997, the host took 996"), "{account:?}");
 }
 
@@ -82,8 +83,8 @@ fn a_wire_that_lost_more_than_it_says_breaks_it() {
 #[test]
 fn gaps_that_differ_by_one_break_the_gaps_alone() {
     let gaps = Gaps::Sensors { lost: 3, before: 4 };
-    let account = broken(|parties, _| {
-        parties[1].gaps.insert("120".into(), gaps);
+    let account = broken(|participants, _| {
+        participants[1].gaps.insert("120".into(), gaps);
     });
     assert_eq!(account.broken, [""; 0]);
     assert_eq!(account.gaps_broken, ["120 at controller: 6 missing by the counts, 7 by the gaps"]);
@@ -92,12 +93,12 @@ fn gaps_that_differ_by_one_break_the_gaps_alone() {
 #[test]
 fn a_stranger_that_sends_is_a_sender_and_its_frames_must_arrive() {
     let stranger = PeerCounts { taken: Counts::from([("108", 5)]), ..PeerCounts::default() };
-    let account = broken(|parties, wire| {
+    let account = broken(|participants, wire| {
         wire.others = vec![stranger.clone()];
         wire.passed.add("108", 5);
-        for party in parties {
-            party.received.add("108", 5);
-            party.seen.as_mut().unwrap().delivered.add("108", 5);
+        for participant in participants {
+            participant.received.add("108", 5);
+            participant.host_counts.as_mut().unwrap().delivered.add("108", 5);
         }
     });
     assert_eq!(account.broken, [""; 0]);
@@ -106,19 +107,19 @@ fn a_stranger_that_sends_is_a_sender_and_its_frames_must_arrive() {
 
 #[test]
 fn on_a_kernels_bus_the_overflow_count_must_be_what_is_missing_in_all() {
-    let (mut parties, _) = whole();
-    parties.iter_mut().for_each(|party| party.seen = None);
-    (parties[0].overflow, parties[1].overflow) = (2, 6);
-    let account = close(&parties, None);
+    let (mut participants, _) = whole();
+    participants.iter_mut().for_each(|participant| participant.host_counts = None);
+    (participants[0].overflow, participants[1].overflow) = (2, 6);
+    let account = close(&participants, None);
     assert_eq!((account.broken.len(), account.gaps_broken.len()), (0, 0), "{account:?}");
-    parties[1].overflow = 5;
-    let account = close(&parties, None);
+    participants[1].overflow = 5;
+    let account = close(&participants, None);
     assert_eq!(account.broken[0], "controller misses 6 frames in all, its queue dropped 5");
 }
 
 #[test]
 fn what_nobody_sent_is_told() {
-    let account = broken(|parties, _| parties[0].received.add("7", 1));
+    let account = broken(|participants, _| participants[0].received.add("7", 1));
     assert_eq!(account.broken, ["emulator received 7, which nobody has sent"]);
 }
 
@@ -133,8 +134,8 @@ fn a_series_of_commands_is_missing_what_lies_before_between_and_after() {
 fn a_frame_lost_in_a_pause_of_its_sender_may_leave_no_gap_but_none_may_be_too_many() {
     let with = |lost, pauses| {
         let gaps = Gaps::Commands { lost, first: 1, last: 3, pauses };
-        broken(|parties, _| {
-            parties[0].gaps.insert("110".into(), gaps);
+        broken(|participants, _| {
+            participants[0].gaps.insert("110".into(), gaps);
         })
     };
     assert_eq!(with(0, 0).gaps_broken.len(), 1);
@@ -146,9 +147,9 @@ fn a_frame_lost_in_a_pause_of_its_sender_may_leave_no_gap_but_none_may_be_too_ma
 fn what_the_senders_own_queue_refused_is_missing_by_the_gaps_and_not_by_the_counts() {
     // The first line does not change; three frames that were never sent leave gaps like any others.
     let gaps = Gaps::Sensors { lost: 5, before: 4 };
-    let account = broken(|parties, _| {
-        parties[0].refused = Counts::from([("120", 3)]);
-        parties[1].gaps.insert("120".into(), gaps);
+    let account = broken(|participants, _| {
+        participants[0].refused = Counts::from([("120", 3)]);
+        participants[1].gaps.insert("120".into(), gaps);
     });
     assert_eq!((account.broken.len(), account.gaps_broken.len()), (0, 0), "{account:?}");
 }

@@ -13,7 +13,7 @@ use std::time::Duration;
 pub(super) struct Disconnected;
 
 /// A transport of 16-byte frames between two processes.
-pub(super) trait Line {
+pub(super) trait FrameTransport {
     /// Sends a frame; false when it was dropped.
     fn send(&mut self, frame: &CanFrame) -> bool;
 
@@ -27,9 +27,9 @@ pub(super) trait Line {
 pub(super) const LONGEST_WAIT: Duration = Duration::from_millis(20);
 
 /// A bus: poll, then a batch with `recvmmsg`, as the controller does.
-pub(super) struct OnBus(pub(super) Box<dyn Bus>);
+pub(super) struct BusTransport(pub(super) Box<dyn Bus>);
 
-impl Line for OnBus {
+impl FrameTransport for BusTransport {
     fn send(&mut self, frame: &CanFrame) -> bool {
         self.0.send(frame).is_ok()
     }
@@ -48,16 +48,16 @@ impl Line for OnBus {
 }
 
 /// One end of a pair of SEQPACKET sockets with blocking reads.
-pub(super) struct OnSocket(OwnedFd);
+pub(super) struct SocketTransport(OwnedFd);
 
-impl OnSocket {
+impl SocketTransport {
     pub(super) fn new(socket: OwnedFd) -> rustix::io::Result<Self> {
         set_socket_timeout(&socket, Timeout::Recv, Some(LONGEST_WAIT))?;
         Ok(Self(socket))
     }
 }
 
-impl Line for OnSocket {
+impl FrameTransport for SocketTransport {
     fn send(&mut self, frame: &CanFrame) -> bool {
         send(&self.0, &frame.to_bytes(), SendFlags::NOSIGNAL).is_ok()
     }

@@ -26,16 +26,17 @@ const DISTURBED_ABOVE: Duration = Duration::from_micros(100);
 /// Time within which members must join the barrier.
 const JOIN_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Why a cycle was not completed.
+/// Why a cycle was not completed. Reports print it by `Debug`.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum Broken {
+pub(super) enum ExchangeError {
     /// Lockstep: a member did not answer within the time-out of the barrier.
     TimedOut(String),
     NobodyThere,
 }
 
+/// When a cycle's sensors were sent, and whether that time can be judged.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sent {
+pub(super) struct ExchangeTiming {
     /// When its sensors were sent, ns.
     pub(super) stamp_ns: u64,
     /// This process was late, before or after.
@@ -43,7 +44,7 @@ pub(super) struct Sent {
 }
 
 /// The bus, and its host if it is embedded.
-pub(super) struct Line {
+pub(super) struct RigBus {
     bus: Box<dyn Bus>,
     server: Option<Server>,
     /// In real time, when the next cycle is due.
@@ -51,7 +52,7 @@ pub(super) struct Line {
     barrier_cycle: u32,
 }
 
-impl Line {
+impl RigBus {
     /// Hosts the bus; on `can://` connects to it.
     pub(super) fn open(url: &BusUrl, arguments: &ConformanceArguments) -> Result<Self, BusError> {
         let clock =
@@ -79,7 +80,7 @@ impl Line {
     }
 
     /// Waits until the barrier begins; returns at once in real time.
-    pub(super) fn begin(&mut self) -> Result<(), Broken> {
+    pub(super) fn begin(&mut self) -> Result<(), ExchangeError> {
         if self.due.is_none() {
             self.wait_for_go(JOIN_TIMEOUT, &mut |_, _| {})?;
         }
@@ -92,7 +93,7 @@ impl Line {
         &mut self,
         frames: &[CanFrame],
         mut take: impl FnMut(&CanFrame, u64),
-    ) -> Result<Sent, Broken> {
+    ) -> Result<ExchangeTiming, ExchangeError> {
         let stamp_ns = MonotonicClock.now().as_nanos();
         for frame in frames {
             // A frame lost to a full queue shows as a cycle without an answer.
@@ -102,7 +103,7 @@ impl Line {
             self.bus.done(self.barrier_cycle);
             self.barrier_cycle += 1;
             self.wait_for_go(bus::host::BARRIER_TIMEOUT * 2, &mut take)?;
-            return Ok(Sent { stamp_ns, disturbed: false });
+            return Ok(ExchangeTiming { stamp_ns, disturbed: false });
         };
         let began_late = MonotonicClock.now().saturating_duration_since(due);
         let next = due + CYCLE;
@@ -112,33 +113,33 @@ impl Line {
             take(&frame, stamp_ns);
         }
         self.due = Some(if late >= CYCLE { MonotonicClock.now() } else { next });
-        Ok(Sent { stamp_ns, disturbed: late > DISTURBED_ABOVE || began_late > DISTURBED_ABOVE })
+        Ok(ExchangeTiming { stamp_ns, disturbed: late > DISTURBED_ABOVE || began_late > DISTURBED_ABOVE })
     }
 
     fn wait_for_go(
         &mut self,
         patience: Duration,
         take: &mut dyn FnMut(&CanFrame, u64),
-    ) -> Result<(), Broken> {
+    ) -> Result<(), ExchangeError> {
         let until = MonotonicClock.now() + patience;
         loop {
             match self.bus.receive() {
                 Received::Frame(frame, stamp_ns) => take(&frame, stamp_ns),
                 Received::Barrier(control) => match control.kind {
                     // Without members the barrier would not wait.
-                    Kind::Go { members: 0 } => return Err(Broken::NobodyThere),
+                    Kind::Go { members: 0 } => return Err(ExchangeError::NobodyThere),
                     Kind::Go { .. } if control.cycle == self.barrier_cycle => return Ok(()),
-                    Kind::TimedOut => return Err(Broken::TimedOut(control.name())),
+                    Kind::TimedOut => return Err(ExchangeError::TimedOut(control.name())),
                     _ => {}
                 },
-                Received::Nothing if MonotonicClock.now() >= until => return Err(Broken::NobodyThere),
+                Received::Nothing if MonotonicClock.now() >= until => return Err(ExchangeError::NobodyThere),
                 Received::Nothing => {}
             }
         }
     }
 }
 
-impl Drop for Line {
+impl Drop for RigBus {
     fn drop(&mut self) {
         if let Some(server) = self.server.take() {
             server.stop.store(true, Ordering::Relaxed);
