@@ -1,6 +1,6 @@
 //! A campaign ready to run: its file, the files that this names, its runs, and their partition into parts.
 
-use crate::child::Limit;
+use crate::child::TimeLimit;
 use crate::command::{self, CommandError, Invocation};
 use crate::condition::{self, Condition, ConditionError};
 use crate::factor::Value;
@@ -33,7 +33,7 @@ pub(crate) struct Campaign {
 
 /// Folders that a campaign looks files up in.
 #[derive(Clone, Debug)]
-pub(crate) struct Places {
+pub(crate) struct InstallPaths {
     /// Folder with the shipped `experiments` and `programs`.
     pub shipped: PathBuf,
     /// Folder of `emulator` and `controller`.
@@ -61,14 +61,14 @@ pub(crate) enum CampaignError {
 
 impl Campaign {
     /// Reads a campaign's file and all files that it names, and checks the first and last values of its lists.
-    pub(crate) fn read(path: &Path, places: &Places) -> Result<Self, CampaignError> {
+    pub(crate) fn read(path: &Path, install_paths: &InstallPaths) -> Result<Self, CampaignError> {
         let mut file = CampaignFile::read(path)?;
         let folder = file.folder()?;
         if let Kind::Command(words) = &mut file.kind {
             words[0] = program(&words[0], &folder)?;
         }
         let inputs = match &file.kind {
-            Kind::Experiment(kind) => Some(CampaignInputs::read(&file, kind, &places.shipped)?),
+            Kind::Experiment(kind) => Some(CampaignInputs::read(&file, kind, &install_paths.shipped)?),
             Kind::Command(_) => None,
         };
         let name = || path.display().to_string();
@@ -77,12 +77,12 @@ impl Campaign {
         let runs = points.runs();
         let parts = Parts {
             campaign: campaign_hash(&file, inputs.as_ref()),
-            program: program_hash(&file, places)?,
+            program: program_hash(&file, install_paths)?,
             columns: columns(&file),
             runs,
             runs_per_part: file.runs_per_part.unwrap_or_else(|| default_runs_per_part(runs)),
         };
-        let campaign = Self { file, points, parts, inputs, programs: places.programs.clone() };
+        let campaign = Self { file, points, parts, inputs, programs: install_paths.programs.clone() };
         if campaign.inputs.is_some() {
             for run in [0, runs - 1] {
                 campaign.condition(&campaign.points.point(run))?;
@@ -113,7 +113,7 @@ impl Campaign {
     /// # Errors
     /// [`CampaignError`] where there is no result: values that the files reject, programs that cannot be started.
     pub(crate) fn run(&self, point: &Point, stop: &AtomicBool) -> Result<Option<Outcome>, CampaignError> {
-        let limit = Limit::of(file::LONGEST_WALL_S, stop);
+        let limit = TimeLimit::of(file::LONGEST_WALL_S, stop);
         let kind = match &self.file.kind {
             Kind::Experiment(kind) => kind,
             Kind::Command(command) => return self.run_command(command, point, false, limit),
@@ -140,7 +140,7 @@ impl Campaign {
         &self,
         point: &Point,
         folder: &Path,
-        limit: Limit<'_>,
+        limit: TimeLimit<'_>,
     ) -> Result<Option<Outcome>, CampaignError> {
         match &self.file.kind {
             Kind::Experiment(_) => self.run_in(point, folder, limit),
@@ -153,7 +153,7 @@ impl Campaign {
         command: &[String],
         point: &Point,
         again: bool,
-        limit: Limit<'_>,
+        limit: TimeLimit<'_>,
     ) -> Result<Option<Outcome>, CampaignError> {
         let invocation = Invocation { command, folder: &self.file.folder()?, again };
         command::run(invocation, &self.points.factors, point, limit)
@@ -163,7 +163,7 @@ impl Campaign {
     fn run_in_temporary_folder(
         &self,
         point: &Point,
-        limit: Limit<'_>,
+        limit: TimeLimit<'_>,
     ) -> Result<Option<Outcome>, CampaignError> {
         let folder = tempfile::Builder::new().prefix("airbench-run-").tempdir();
         let folder = folder.map_err(|error| CampaignError::Program("a folder for the run".into(), error))?;
@@ -175,7 +175,7 @@ impl Campaign {
         &self,
         point: &Point,
         folder: &Path,
-        limit: Limit<'_>,
+        limit: TimeLimit<'_>,
     ) -> Result<Option<Outcome>, CampaignError> {
         let condition = self.condition(point)?;
         let inputs = self.inputs.as_ref().expect("only campaigns of experiments run in folders");
@@ -257,12 +257,12 @@ fn campaign_hash(file: &CampaignFile, inputs: Option<&CampaignInputs>) -> String
 }
 
 /// Hash of the executables: this program, and those that it starts.
-fn program_hash(file: &CampaignFile, places: &Places) -> Result<String, CampaignError> {
+fn program_hash(file: &CampaignFile, install_paths: &InstallPaths) -> Result<String, CampaignError> {
     let own =
         std::env::current_exe().map_err(|error| CampaignError::Program("this program".into(), error))?;
     let mut programs = vec![own];
     if let Kind::Experiment(ExperimentKind { pace: Pace::Lockstep, .. }) = &file.kind {
-        programs.extend(["emulator", "controller"].map(|name| places.programs.join(name)));
+        programs.extend(["emulator", "controller"].map(|name| install_paths.programs.join(name)));
     }
     if let Kind::Command(words) = &file.kind {
         // Those of its words that name files: scripts and programs.

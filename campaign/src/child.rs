@@ -39,7 +39,7 @@ impl ChildProcess {
     ///
     /// # Errors
     /// [`WaitError`] at the time limit, or when the campaign stops; the process still runs then.
-    pub(crate) fn wait(&mut self, limit: Limit<'_>) -> Result<ExitStatus, WaitError> {
+    pub(crate) fn wait(&mut self, limit: TimeLimit<'_>) -> Result<ExitStatus, WaitError> {
         loop {
             if let Some(status) = self.child.try_wait()? {
                 return Ok(status);
@@ -75,7 +75,7 @@ impl Drop for ChildProcess {
 
 /// How long a run may take.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Limit<'a> {
+pub(crate) struct TimeLimit<'a> {
     pub began: Instant,
     /// Longest time, s of the wall clock.
     pub longest_s: f64,
@@ -83,7 +83,7 @@ pub(crate) struct Limit<'a> {
     pub stop: &'a AtomicBool,
 }
 
-impl<'a> Limit<'a> {
+impl<'a> TimeLimit<'a> {
     /// A limit of `longest_s` that begins now.
     pub(crate) fn of(longest_s: f64, stop: &'a AtomicBool) -> Self {
         Self { began: Instant::now(), longest_s, stop }

@@ -11,7 +11,7 @@
 //!
 //! Programs run in the folder of the campaign's file, so that relative paths do not depend on the folder of the start.
 
-use crate::child::{ChildProcess, Limit, WaitError};
+use crate::child::{ChildProcess, TimeLimit, WaitError};
 use crate::factor::{Factor, Value};
 use crate::outcome::{EndState, Outcome};
 use crate::points::Point;
@@ -54,7 +54,7 @@ pub(crate) fn run(
     Invocation { command, folder, again }: Invocation<'_>,
     factors: &[Factor],
     point: &Point,
-    limit: Limit<'_>,
+    limit: TimeLimit<'_>,
 ) -> Result<Option<Outcome>, CommandError> {
     let mut process = ChildProcess::start(
         Command::new(&command[0])
@@ -160,7 +160,7 @@ mod tests {
         let command: Vec<_> = ["sh", "-c", script].map(str::to_owned).into();
         let stop = AtomicBool::new(false);
         let invocation = Invocation { command: &command, folder: Path::new("/"), again: false };
-        run(invocation, &[factor], &point, Limit::of(longest_s, &stop))
+        run(invocation, &[factor], &point, TimeLimit::of(longest_s, &stop))
     }
 
     fn answer(script: &str, longest_s: f64) -> Outcome {

@@ -1,7 +1,7 @@
 //! The subcommands of the program.
 
-use crate::campaign::{Campaign, CampaignError, Places};
-use crate::child::Limit;
+use crate::campaign::{Campaign, CampaignError, InstallPaths};
+use crate::child::TimeLimit;
 use crate::cli::{Cli, Command, CommonArguments, PlanArguments, RepeatArguments, RunArguments};
 use crate::engine::{EngineError, Start, StartReport, duration_text};
 use crate::file::LONGEST_WALL_S;
@@ -77,8 +77,8 @@ fn say(line: &str) {
 fn read(common: &CommonArguments) -> Result<Campaign, CommandError> {
     let own = || std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned()));
     let programs = common.programs.clone().or_else(own).unwrap_or_default();
-    let places = Places { shipped: common.shipped.clone(), programs };
-    Ok(Campaign::read(&common.file, &places)?)
+    let install_paths = InstallPaths { shipped: common.shipped.clone(), programs };
+    Ok(Campaign::read(&common.file, &install_paths)?)
 }
 
 fn stem(file: &Path) -> String {
@@ -213,7 +213,7 @@ fn repeat(arguments: &RepeatArguments, stop: &AtomicBool) -> Result<Exit, Comman
             .map_err(|error| CommandError::File(out.display().to_string(), error))?;
         files = format!("; all its files are in {}", out.display());
     }
-    let limit = Limit::of(LONGEST_WALL_S, stop);
+    let limit = TimeLimit::of(LONGEST_WALL_S, stop);
     let Some(outcome) = campaign.repeat(&point, &out, limit)? else { return Ok(Exit::Interrupted) };
     let because = if outcome.because.is_empty() { String::new() } else { format!(": {}", outcome.because) };
     say(&format!("run {run} {}{because}{files}", outcome.ended.name()));

@@ -5,7 +5,7 @@
 
 use crate::edits::{self, EditError};
 use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
-use crate::inputs::{CampaignInputs, RigFile, Text};
+use crate::inputs::{CampaignInputs, RigFile, TextFile};
 use crate::points::{Point, Points};
 use axis_control::program::file::Source;
 use plant::effects::draw::{Among, EffectSampler};
@@ -20,7 +20,7 @@ pub(crate) struct Condition<'s> {
     pub rig: RigParameters,
     pub rig_toml: String,
     /// The experiment, with its path.
-    pub experiment: &'s Text,
+    pub experiment: &'s TextFile,
     /// Its text with the run's values.
     pub experiment_toml: String,
     /// How the rig is set up.
@@ -56,7 +56,7 @@ pub(crate) fn condition<'s>(
     }
     let nominal = inputs.rig(sorted.file(FileChoice::Rig));
     let experiment = inputs.experiment(sorted.file(FileChoice::Experiment));
-    let edited = |file: &Text, numbers: &[(String, f64)]| {
+    let edited = |file: &TextFile, numbers: &[(String, f64)]| {
         let numbers = numbers.iter().map(|(path, number)| (path.as_str(), *number));
         edits::with(&file.text, numbers)
             .map_err(|error: EditError| refused(format!("{}: {error}", file.path.display())))

@@ -61,7 +61,7 @@ pub(crate) fn moved(text: &str, path: &Path) -> Result<String, EditError> {
 }
 
 /// The file that the one at `path` calls `name`.
-pub(crate) fn beside(path: &Path, name: &str) -> PathBuf {
+pub(crate) fn sibling_path(path: &Path, name: &str) -> PathBuf {
     path.parent().unwrap_or(Path::new("")).join(name)
 }
 
@@ -73,8 +73,8 @@ struct FileNames<'a> {
 
 impl VisitMut for FileNames<'_> {
     fn visit_value_mut(&mut self, value: &mut Value) {
-        let name = value.as_str().filter(|name| beside(self.path, name).is_file());
-        let whole = name.and_then(|name| std::path::absolute(beside(self.path, name)).ok());
+        let name = value.as_str().filter(|name| sibling_path(self.path, name).is_file());
+        let whole = name.and_then(|name| std::path::absolute(sibling_path(self.path, name)).ok());
         if let (Some(name), Some(whole)) = (name, whole.as_ref().and_then(|whole| whole.to_str())) {
             self.names.push(name.to_owned());
             *value = whole.into();

@@ -1,6 +1,6 @@
 //! The files that a campaign names, read once before the first run, and their hashes.
 
-use crate::edits::{self, EditError, beside};
+use crate::edits::{self, EditError, sibling_path};
 use crate::factor::{Changes, Factor, FileChoice, Value, Values};
 use crate::file::{CampaignFile, ExperimentKind};
 use crate::parts::hash;
@@ -17,7 +17,7 @@ const SHIPPED: &str = "shipped";
 #[derive(Debug)]
 pub(crate) struct CampaignInputs {
     /// Experiments by the name that the file gives them.
-    experiments: BTreeMap<String, Text>,
+    experiments: BTreeMap<String, TextFile>,
     /// Rigs by the name that the file gives them.
     rigs: BTreeMap<String, RigFile>,
     programs: BTreeMap<PathBuf, Source>,
@@ -63,14 +63,14 @@ impl Folders {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Text {
+pub(crate) struct TextFile {
     pub path: PathBuf,
     pub text: String,
 }
 
 #[derive(Debug)]
 pub(crate) struct RigFile {
-    pub file: Text,
+    pub file: TextFile,
     /// Its parameters, which the controllers know.
     pub nominal: RigParameters,
 }
@@ -96,7 +96,7 @@ impl CampaignInputs {
         let read = |path: PathBuf| {
             let text = std::fs::read_to_string(&path)
                 .map_err(|reported| error(format!("{}: {reported}", path.display())))?;
-            Ok(Text { path, text })
+            Ok(TextFile { path, text })
         };
         let chosen = |choice| names(&file.factors, choice);
         let mut rigs = BTreeMap::new();
@@ -104,7 +104,7 @@ impl CampaignInputs {
             rigs.insert(name.clone(), rig_file(read(folders.campaign.join(&name))?).map_err(error)?);
         }
         if rigs.is_empty() {
-            let text = Text { path: "rig.toml".into(), text: RigParameters::BASELINE_TOML.to_owned() };
+            let text = TextFile { path: "rig.toml".into(), text: RigParameters::BASELINE_TOML.to_owned() };
             rigs.insert(SHIPPED.to_owned(), rig_file(text).map_err(error)?);
         }
         let mut experiments = BTreeMap::new();
@@ -122,7 +122,7 @@ impl CampaignInputs {
             Err(reported) => Err(error(reported.to_string())),
         };
         let stroke_m = rigs[&defaults[1]].nominal.cylinder().stroke_m;
-        for Text { path, text } in experiments.values() {
+        for TextFile { path, text } in experiments.values() {
             let experiment = Experiment::from_toml(text, path, stroke_m)
                 .map_err(|reported| error(reported.to_string()))?;
             for section in [&experiment.drive, &experiment.load].into_iter().flatten() {
@@ -137,7 +137,7 @@ impl CampaignInputs {
         for (path, text) in experiments.values().map(|file| (&file.path, &file.text)).chain(sources) {
             let reported = |reported: EditError| error(format!("{}: {reported}", path.display()));
             for name in edits::files_beside(text, path).map_err(reported)? {
-                let file = beside(path, &name);
+                let file = sibling_path(path, &name);
                 let bytes = std::fs::read(&file)
                     .map_err(|reported| error(format!("{}: {reported}", file.display())))?;
                 further.insert((name, hash(&bytes)));
@@ -150,7 +150,7 @@ impl CampaignInputs {
     ///
     /// # Panics
     /// If the campaign names no such file.
-    pub(crate) fn experiment(&self, name: Option<&str>) -> &Text {
+    pub(crate) fn experiment(&self, name: Option<&str>) -> &TextFile {
         &self.experiments[name.unwrap_or(&self.defaults[0])]
     }
 
@@ -163,7 +163,7 @@ impl CampaignInputs {
     }
 
     /// A program that an experiment names.
-    pub(crate) fn program(&self, name: &str, experiment: &Text) -> Option<&Source> {
+    pub(crate) fn program(&self, name: &str, experiment: &TextFile) -> Option<&Source> {
         self.programs.get(&self.folders.program(name, &experiment.path))
     }
 
@@ -199,7 +199,7 @@ fn names(factors: &[Factor], choice: FileChoice) -> Vec<String> {
         .collect()
 }
 
-fn rig_file(file: Text) -> Result<RigFile, String> {
+fn rig_file(file: TextFile) -> Result<RigFile, String> {
     let nominal = RigParameters::from_toml(&file.text, &file.path.display().to_string())
         .map_err(|reported| reported.to_string())?;
     Ok(RigFile { file, nominal })

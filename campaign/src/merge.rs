@@ -5,7 +5,7 @@
 use crate::campaign::Campaign;
 use crate::factor::Values;
 use crate::file::is_figure;
-use crate::parts::{PartError, Parts, beside};
+use crate::parts::{PartError, Parts, temporary_file_in};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{self, BufWriter, Write};
@@ -40,12 +40,12 @@ pub(crate) struct Results {
     /// Categorical columns by their name.
     words: BTreeMap<String, CategoricalColumn>,
     /// The first [`MAX_REPORTED`] runs that were not completed.
-    pub unfinished: Vec<Unfinished>,
+    pub incomplete_runs: Vec<IncompleteRun>,
 }
 
 /// A run that was not completed.
 #[derive(Debug, PartialEq, Eq)]
-pub(crate) struct Unfinished {
+pub(crate) struct IncompleteRun {
     pub run: u64,
     /// `time-over`, `stopped` or `failed`.
     pub ended: String,
@@ -80,29 +80,29 @@ impl CategoricalColumn {
 /// [`MergeError`]; `runs.csv` is unchanged then.
 pub(crate) fn merge(campaign: &Campaign, folders: &[PathBuf], to: &Path) -> Result<Results, MergeError> {
     let parts = &campaign.parts;
-    let places = places(parts, folders)?;
+    let part_folders = part_folders(parts, folders)?;
     let path = to.join("runs.csv");
     let failed = |error| MergeError::Write { path: path.display().to_string(), error };
     std::fs::create_dir_all(to).map_err(failed)?;
-    let beside = beside(to).map_err(failed)?;
-    let mut file = BufWriter::new(beside);
+    let temporary = temporary_file_in(to).map_err(failed)?;
+    let mut file = BufWriter::new(temporary);
     writeln!(file, "{}", parts.columns.join(",")).map_err(failed)?;
     let mut results = Results::of(campaign);
-    for (part, folder) in places.iter().enumerate() {
+    for (part, folder) in part_folders.iter().enumerate() {
         let rows = parts.read(folder, part as u64)?.ok_or_else(|| missing(parts, &[part as u64]))?;
         file.write_all(rows.as_bytes()).map_err(failed)?;
         results.add(&parts.columns, &rows);
     }
     assert_eq!(results.runs, parts.runs, "parts that are whole have a row for each of their runs");
-    let beside = file.into_inner().map_err(|error| failed(error.into_error()))?;
-    beside.as_file().sync_all().map_err(failed)?;
-    beside.persist(&path).map_err(|error| failed(error.error))?;
+    let temporary = file.into_inner().map_err(|error| failed(error.into_error()))?;
+    temporary.as_file().sync_all().map_err(failed)?;
+    temporary.persist(&path).map_err(|error| failed(error.error))?;
     File::open(to).and_then(|folder| folder.sync_all()).map_err(failed)?;
     Ok(results)
 }
 
-fn places<'f>(parts: &Parts, folders: &'f [PathBuf]) -> Result<Vec<&'f Path>, MergeError> {
-    let mut places = Vec::new();
+fn part_folders<'f>(parts: &Parts, folders: &'f [PathBuf]) -> Result<Vec<&'f Path>, MergeError> {
+    let mut part_folders = Vec::new();
     let mut absent = Vec::new();
     for part in 0..parts.count() {
         let mut holders = folders.iter().filter(|folder| parts.path(folder, part).exists());
@@ -111,11 +111,11 @@ fn places<'f>(parts: &Parts, folders: &'f [PathBuf]) -> Result<Vec<&'f Path>, Me
                 let (one, other) = (one.display().to_string(), other.display().to_string());
                 return Err(MergeError::Duplicate { part, one, other });
             }
-            (Some(one), None) => places.push(one.as_path()),
+            (Some(one), None) => part_folders.push(one.as_path()),
             (None, _) => absent.push(part),
         }
     }
-    if absent.is_empty() { Ok(places) } else { Err(missing(parts, &absent)) }
+    if absent.is_empty() { Ok(part_folders) } else { Err(missing(parts, &absent)) }
 }
 
 fn missing(parts: &Parts, absent: &[u64]) -> MergeError {
@@ -169,9 +169,9 @@ impl Results {
         let (ended, because) = (place("ended"), place("because"));
         for row in reader.records().map_while(Result::ok) {
             let cell = |place: Option<usize>| place.and_then(|place| row.get(place)).unwrap_or_default();
-            if cell(ended) != "done" && self.unfinished.len() < MAX_REPORTED {
+            if cell(ended) != "done" && self.incomplete_runs.len() < MAX_REPORTED {
                 let (ended, because) = (cell(ended).to_owned(), cell(because).to_owned());
-                self.unfinished.push(Unfinished { run: self.runs, ended, because });
+                self.incomplete_runs.push(IncompleteRun { run: self.runs, ended, because });
             }
             self.runs += 1;
             for (name, cell) in columns.iter().zip(&row) {
@@ -194,7 +194,7 @@ impl Results {
 
     /// Whether every run was completed and kept the bounds of its experiment.
     pub(crate) fn all_passed(&self) -> bool {
-        self.unfinished.is_empty() && !self.numbers("passed").unwrap_or_default().contains(&0.0)
+        self.incomplete_runs.is_empty() && !self.numbers("passed").unwrap_or_default().contains(&0.0)
     }
 
     pub(crate) fn words(&self, name: &str) -> Option<&CategoricalColumn> {

@@ -155,16 +155,16 @@ pub fn write_whole(path: &Path, bytes: &[u8]) -> io::Result<()> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)?;
     // Processes that make the same part use different temporary files with the same bytes.
-    let mut beside = beside(folder)?;
-    beside.write_all(bytes)?;
-    beside.as_file().sync_all()?;
-    beside.persist(path).map_err(|error| error.error)?;
+    let mut temporary = temporary_file_in(folder)?;
+    temporary.write_all(bytes)?;
+    temporary.as_file().sync_all()?;
+    temporary.persist(path).map_err(|error| error.error)?;
     // Synchronising the folder makes the rename durable.
     File::open(folder)?.sync_all()
 }
 
 /// A temporary file in `folder` with the usual permissions, to be renamed when it is complete.
-pub(crate) fn beside(folder: &Path) -> io::Result<NamedTempFile> {
+pub(crate) fn temporary_file_in(folder: &Path) -> io::Result<NamedTempFile> {
     let readable = Permissions::from_mode(0o666); // less what the umask takes
     tempfile::Builder::new().prefix(".part-").suffix(".tmp").permissions(readable).tempfile_in(folder)
 }

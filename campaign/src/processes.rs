@@ -2,7 +2,7 @@
 //!
 //! It is slower than a rehearsal, and needed for faults and lost frames, which the emulator simulates.
 
-use crate::child::{ChildProcess, Limit, WaitError};
+use crate::child::{ChildProcess, TimeLimit, WaitError};
 use crate::condition::{Condition, ConditionError};
 use crate::edits;
 use crate::factor::Value;
@@ -43,7 +43,7 @@ pub(crate) fn run(
     (run, seconds): (u64, f64),
     programs: &Path,
     folder: &Path,
-    limit: Limit<'_>,
+    limit: TimeLimit<'_>,
 ) -> Result<Outcome, ProcessesError> {
     let system = |what: &str| system(run, what);
     let files = Files::write(condition, inputs, run, folder)?;

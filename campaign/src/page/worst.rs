@@ -3,7 +3,7 @@
 use super::value;
 use crate::campaign::Campaign;
 use crate::factor::Values;
-use crate::merge::{Results, Unfinished};
+use crate::merge::{IncompleteRun, Results};
 use pagekit::grid::Grid;
 use pagekit::number::without_unit;
 use pagekit::page::escaped;
@@ -19,11 +19,12 @@ pub(super) fn section(
     repeat: &dyn Fn(u64) -> String,
 ) -> String {
     let mut text = "<h2>Worst cases</h2>\n".to_owned();
-    if !results.unfinished.is_empty() {
+    if !results.incomplete_runs.is_empty() {
         let head = ["run", "ended", "because", "with", "repeated by"];
-        let rows = results.unfinished.iter().take(RUNS_SHOWN).map(|Unfinished { run, ended, because }| {
-            vec![run.to_string(), ended.clone(), because.clone(), values(campaign, *run), repeat(*run)]
-        });
+        let rows =
+            results.incomplete_runs.iter().take(RUNS_SHOWN).map(|IncompleteRun { run, ended, because }| {
+                vec![run.to_string(), ended.clone(), because.clone(), values(campaign, *run), repeat(*run)]
+            });
         text += "<h3>Runs that did not come to their end, the first</h3>\n";
         text += &Grid::new(head, rows).html();
     }
