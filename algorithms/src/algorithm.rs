@@ -10,7 +10,7 @@
 //! It neither allocates nor blocks; that its result is a number is checked behind it.
 
 use nominal::RigParameters;
-use settings::parameters::{Declared, Parameter};
+use settings::parameters::{Parameter, ParameterSet};
 
 /// Input of a control algorithm, filled in by the pre-controller. The C interface (`struct airbench_ready`) has the same layout:
 /// numbers of 8 bytes, in this order.
@@ -66,7 +66,7 @@ pub trait Algorithm: Send {
 /// A control algorithm whose parameters are declared by [`settings::parameters!`] and read as fields; each is an [`Algorithm`].
 pub trait ControlLaw: Send {
     /// Fields that are read from the values of the program, each by its place in the table.
-    type Parameters: Declared;
+    type Parameters: ParameterSet;
 
     /// Resets integral and memory, if it has any. The axis has been without control before.
     fn reset(&mut self, _input: &AlgorithmInput, _parameters: &Self::Parameters) {}

@@ -62,12 +62,12 @@ pub(crate) fn test(front: &Front, arguments: Vec<OsString>) -> Result<u8, FrontE
     let look = look.args(["-c", "import airbench_hil.pytest_plugin"]).stdin(Stdio::null()).output();
     let look = look.map_err(|reason| FrontError::Start { program: python.display().to_string(), reason })?;
     if !look.status.success() {
-        let said = String::from_utf8_lossy(&look.stderr);
+        let output = String::from_utf8_lossy(&look.stderr);
         return Err(FrontError::Input(format!(
             "{} has no airbench_hil with pytest ({}): pip install both, the wheel of a release or \
              python/ of a checkout, and pytest, or name another interpreter with AIRBENCH_PYTHON",
             python.display(),
-            said.lines().last().unwrap_or("it said nothing")
+            output.lines().last().unwrap_or("it said nothing")
         )));
     }
     let mut command = Command::new(python);

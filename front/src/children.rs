@@ -237,8 +237,8 @@ mod tests {
         let mut children = Children::watch().unwrap();
         assert_eq!(children.call(&mut shell("exit 7")).unwrap(), 7);
         assert_eq!(children.call(&mut shell("kill -KILL $$")).unwrap(), 137);
-        let said = children.call(&mut Command::new("/nowhere/program")).unwrap_err().to_string();
-        assert!(said.contains("cannot start /nowhere/program"), "{said}");
+        let message = children.call(&mut Command::new("/nowhere/program")).unwrap_err().to_string();
+        assert!(message.contains("cannot start /nowhere/program"), "{message}");
     }
 
     #[test]

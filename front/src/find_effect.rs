@@ -10,7 +10,7 @@ mod judge;
 
 use crate::children::Children;
 use crate::cli::FindEffectArguments;
-use crate::pair::{Pair, PairError};
+use crate::pair::{PairError, ProgramPair};
 use crate::private::RunBus;
 use crate::{Front, FrontError, last_lines, logs, make_folder, say};
 use protocol::exit::Exit;
@@ -208,7 +208,8 @@ impl Search<'_> {
     ) -> Result<(), FrontError> {
         let experiment = fs::read_to_string(file).map_err(FrontError::input(file))?;
         let pace = if self.arguments.lockstep { &["--pace", "lockstep"][..] } else { &[] };
-        let mut pair = Pair::new([&self.emulator, &self.controller], [rig, &self.rig], file, run, &self.bus);
+        let mut pair =
+            ProgramPair::new([&self.emulator, &self.controller], [rig, &self.rig], file, run, &self.bus);
         pair.emulator.args(["--seed", &noise.to_string()]).args(pace).args(more);
         pair.controller.arg("--programs").arg(&self.programs).args(pace);
         pair.controller.args(without_settling(&experiment).iter().flat_map(|variable| ["--set", variable]));

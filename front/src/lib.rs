@@ -210,11 +210,11 @@ fn parse(arguments: &[OsString], name: &str) -> Result<cli::Cli, u8> {
             say(help().trim_end());
             return Exit::Good as u8;
         }
-        let said = match error.kind() {
+        let message = match error.kind() {
             ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => help(),
             _ => refusal(&error, name, &command),
         };
-        let _ = writeln!(io::stderr(), "{}", said.trim_end());
+        let _ = writeln!(io::stderr(), "{}", message.trim_end());
         Exit::BadInput as u8
     })
 }

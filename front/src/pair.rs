@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 const GRACE: Duration = Duration::from_secs(1);
 
 /// Emulator and controller before their start.
-pub(crate) struct Pair {
+pub(crate) struct ProgramPair {
     pub(crate) emulator: Command,
     pub(crate) controller: Command,
     run: PathBuf,
@@ -25,7 +25,7 @@ pub(crate) enum PairError {
     Other(FrontError),
 }
 
-impl Pair {
+impl ProgramPair {
     /// Both programs, each with its rig file, for an experiment into a folder.
     pub(crate) fn new(
         programs: [&Path; 2],

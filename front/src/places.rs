@@ -139,9 +139,9 @@ mod tests {
     #[test]
     fn what_the_environment_names_is_the_only_place_and_messages_name_it() {
         let places = Places::of(Path::new("/usr/bin/airbench"), |name| Some(format!("/{name}").into()));
-        let said = places.program("bench").unwrap_err().to_string();
-        assert!(said.contains("looked for /AIRBENCH_BIN/bench;"), "{said}");
-        let said = places.data("rig.dbc").unwrap_err().to_string();
-        assert!(said.contains("/AIRBENCH_SHARE/rig.dbc, /AIRBENCH_SHARE/protocol/rig.dbc;"), "{said}");
+        let message = places.program("bench").unwrap_err().to_string();
+        assert!(message.contains("looked for /AIRBENCH_BIN/bench;"), "{message}");
+        let message = places.data("rig.dbc").unwrap_err().to_string();
+        assert!(message.contains("/AIRBENCH_SHARE/rig.dbc, /AIRBENCH_SHARE/protocol/rig.dbc;"), "{message}");
     }
 }

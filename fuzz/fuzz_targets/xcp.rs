@@ -20,7 +20,7 @@ static OPEN: LazyLock<Slave> = LazyLock::new(|| unlocked(LOCKED.clone()));
 
 /// Connects and unlocks.
 fn unlocked(mut slave: Slave) -> Slave {
-    let mut say = |packet: &[u8]| slave.command(packet, 0, &mut Strict { open: false });
+    let mut say = |packet: &[u8]| slave.command(packet, 0, &mut AccessChecker { open: false });
     say(&[0xFF, 0]);
     let [first, second] = [0, 1].map(|rest| say(&[0xF8, rest, 1]).expect("a seed"));
     let seed = [&first[2..8], &second[2..4]].concat().try_into().expect("8 bytes");
@@ -32,11 +32,11 @@ fn unlocked(mut slave: Slave) -> Slave {
 }
 
 /// Who acts on what is written, and whether somebody may write.
-struct Strict {
+struct AccessChecker {
     open: bool,
 }
 
-impl ParameterActions for Strict {
+impl ParameterActions for AccessChecker {
     fn set(&mut self, _place: usize, value: f64) {
         assert!(self.open, "written without the key");
         assert!(value.is_finite(), "{value}");
@@ -58,7 +58,7 @@ fuzz_target!(|input: (bool, Vec<(u8, [u8; 8])>)| {
     let mut slave = if open { OPEN.clone() } else { LOCKED.clone() };
     for (cycle, (length, packet)) in (0..).zip(packets) {
         // It stays open no longer than the session that was opened.
-        let mut actions = Strict { open: open && slave.is_unlocked() };
+        let mut actions = AccessChecker { open: open && slave.is_unlocked() };
         let _ = slave.command(&packet[..usize::from(length).min(packet.len())], cycle, &mut actions);
         let parameters = slave.image.parameters().to_vec();
         slave.cycle(cycle, &[1.0; COUNT], &parameters);

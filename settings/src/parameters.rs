@@ -137,7 +137,7 @@ impl Declaration {
 }
 
 /// Parameters that [`crate::parameters!`] declared.
-pub trait Declared: Sized {
+pub trait ParameterSet: Sized {
     /// Their table.
     const TABLE: &'static [Parameter];
 
@@ -220,7 +220,7 @@ macro_rules! parameters {
             }
         }
 
-        impl $crate::parameters::Declared for $name {
+        impl $crate::parameters::ParameterSet for $name {
             const TABLE: &'static [$crate::parameters::Parameter] = Self::TABLE;
 
             #[inline]

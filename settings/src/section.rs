@@ -337,7 +337,7 @@ impl<'a> Section<'a> {
 
     /// A file that the text names, relative to the folder of the file that is read.
     #[must_use]
-    pub fn beside(&self, name: &str) -> PathBuf {
+    pub fn sibling_path(&self, name: &str) -> PathBuf {
         self.source.file.parent().unwrap_or(Path::new("")).join(name)
     }
 

@@ -175,7 +175,7 @@ impl Reader<'_> {
                 ((kind.make)(self.rig), kind.controls, kind.parameters.to_vec())
             }
             (None, Some(library)) => {
-                let plugin = plugin::load(&section.beside(&library.text), self.rig)
+                let plugin = plugin::load(&section.sibling_path(&library.text), self.rig)
                     .map_err(|error| section.wrong_at("library", &format!("library: {error}")))?;
                 let description = plugin.description.clone();
                 (Box::new(plugin), description.controls, description.parameters)

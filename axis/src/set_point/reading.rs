@@ -42,7 +42,7 @@ fn stated_quantity(segment: &Section<'_>) -> Option<Quantity> {
         return Some(*only);
     }
     if name == table::KIND.name {
-        return table::quantity_of(&segment.beside(segment.peek("file")?));
+        return table::quantity_of(&segment.sibling_path(segment.peek("file")?));
     }
     QUANTITY_KEYS.iter().find(|(key, _)| segment.has(key)).map(|(_, quantity)| *quantity)
 }

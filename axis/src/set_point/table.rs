@@ -31,7 +31,7 @@ const MOST_POINTS: usize = 1_000_000;
 
 fn read(reader: &mut SegmentReader<'_, '_>) -> Result<Arc<dyn Law>, SettingsError> {
     let file = reader.section.needed_text("file", "the CSV file, relative to the experiment's folder")?;
-    let path = reader.section.beside(&file.text);
+    let path = reader.section.sibling_path(&file.text);
     let smooth = reader.section.choice("interpolation", &[("linear", false), ("smooth", true)])?;
     let reported = |problem: String| reader.section.wrong_at("file", &format!("file: {problem}"));
     let (quantity, points) = points_of(&path).map_err(reported)?;

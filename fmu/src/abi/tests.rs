@@ -3,7 +3,7 @@
 use super::*;
 use std::sync::Mutex;
 
-static SAID: Mutex<Vec<(Status, String)>> = Mutex::new(Vec::new());
+static LOGGED: Mutex<Vec<(Status, String)>> = Mutex::new(Vec::new());
 
 /// An importer's logger. Rust cannot define one with variable arguments; on this machine's C interface the named ones are
 /// passed the same way.
@@ -14,14 +14,15 @@ unsafe extern "C" fn log(
     _category: *const c_char,
     message: *const c_char,
 ) {
-    SAID.lock().unwrap().push((status, text(message).unwrap_or_default()));
+    LOGGED.lock().unwrap().push((status, text(message).unwrap_or_default()));
 }
 
-type Plain = unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
+type NonVariadicLogger =
+    unsafe extern "C" fn(*mut c_void, *const c_char, Status, *const c_char, *const c_char);
 
 fn callbacks() -> Callbacks {
     // SAFETY: no variable argument is passed, and the named ones travel alike.
-    let logger = unsafe { std::mem::transmute::<Plain, Logger>(log) };
+    let logger = unsafe { std::mem::transmute::<NonVariadicLogger, Logger>(log) };
     let null = std::ptr::null();
     Callbacks {
         logger: Some(logger),
@@ -53,7 +54,9 @@ fn null_is_an_error_and_no_crash() {
     assert!(fmi2Instantiate(nothing, CO_SIMULATION, nothing, nothing, std::ptr::null(), 0, 0).is_null());
     let callbacks = callbacks();
     assert!(fmi2Instantiate(nothing, CO_SIMULATION, nothing, nothing, &callbacks, 0, 0).is_null());
-    assert!(SAID.lock().unwrap().iter().any(|(_, said)| said.contains("fmuResourceLocation is missing")));
+    assert!(
+        LOGGED.lock().unwrap().iter().any(|(_, message)| message.contains("fmuResourceLocation is missing"))
+    );
 }
 
 #[test]
@@ -69,7 +72,7 @@ fn refusals_reach_the_logger_and_percent_signs_are_no_formats() {
     let instance = component();
     assert_eq!(on(instance, |_| Err(Refusal::Time("100 % of it".into()))), Status::Error);
     let expected = (Status::Error, "100 %% of it".to_owned());
-    assert!(SAID.lock().unwrap().contains(&expected));
+    assert!(LOGGED.lock().unwrap().contains(&expected));
     fmi2FreeInstance(instance);
 }
 

@@ -1,7 +1,7 @@
 //! One slice of a measurement, which has the machine for itself.
 
 use crate::children::{Children, Event};
-use crate::pair::{Pair, PairError};
+use crate::pair::{PairError, ProgramPair};
 use crate::{Front, FrontError, last_lines, logs};
 use runlog::run_folder::{CYCLICTEST_JSON, PING_PONG_JSON, PROBE_CSV};
 use rustix::process::Pid;
@@ -88,8 +88,8 @@ impl SliceRunner {
         loop {
             match self.children.next(Some(deadline)) {
                 Event::Ended(ended, _) if ended == load => {
-                    let said = last_lines(log, 1);
-                    return Err(FrontError::Input(format!("the load generator ended at once: {said}")));
+                    let output = last_lines(log, 1);
+                    return Err(FrontError::Input(format!("the load generator ended at once: {output}")));
                 }
                 Event::Ended(..) => {}
                 Event::Interrupted | Event::TimeUp => return Ok(Some(load)),
@@ -130,14 +130,14 @@ impl SliceRunner {
         // Its log repeats the histogram, one line for each nanosecond.
         let is_bin =
             |line: &str| line.bytes().all(|byte| byte.is_ascii_digit() || byte == b' ') && line.contains(' ');
-        let said = fs::read_to_string(&log).unwrap_or_default();
-        let said: Vec<_> = said.lines().filter(|line| !is_bin(line)).collect();
-        fs::write(&log, said.join("\n") + "\n").map_err(FrontError::output(&log))?;
+        let output = fs::read_to_string(&log).unwrap_or_default();
+        let output: Vec<_> = output.lines().filter(|line| !is_bin(line)).collect();
+        fs::write(&log, output.join("\n") + "\n").map_err(FrontError::output(&log))?;
         if code == 0 && part.metadata().is_ok_and(|part| part.len() > 0) {
             let whole = folder.join(CYCLICTEST_JSON);
             return fs::rename(&part, &whole).map_err(FrontError::output(&whole));
         }
-        let first = said.into_iter().find(|line| !line.is_empty()).unwrap_or("it said nothing");
+        let first = output.into_iter().find(|line| !line.is_empty()).unwrap_or("it said nothing");
         let why = format!("cyclictest ended with code {code}: {first}");
         front.warn(&format!("warning: {why}"));
         self.reference_missing = Some(why);
@@ -149,7 +149,7 @@ impl SliceRunner {
         let [cpu, controller_cpu] = self.cpus.map(|cpu| cpu.to_string());
         let (seconds, priority) = (self.seconds.to_string(), self.priority.to_string());
         let programs = [self.emulator.as_path(), &self.controller];
-        let mut pair = Pair::new(programs, [&self.rig, &self.rig], &self.experiment, run, &self.bus);
+        let mut pair = ProgramPair::new(programs, [&self.rig, &self.rig], &self.experiment, run, &self.bus);
         pair.emulator.args(["--seconds", &seconds]);
         pair.controller.arg("--repeat").arg("--programs").arg(&self.programs);
         for (program, cpu) in [(&mut pair.emulator, cpu), (&mut pair.controller, controller_cpu)] {
@@ -167,9 +167,9 @@ impl SliceRunner {
             Ok(_) => Ok(()),
             Err(PairError::Other(error)) => Err(error),
             Err(PairError::Failed { code, console }) => {
-                let said = fs::read_to_string(&console).unwrap_or_default();
+                let output = fs::read_to_string(&console).unwrap_or_default();
                 let lines =
-                    said.lines().filter(|line| !line.contains("warning") && !line.contains("simulated"));
+                    output.lines().filter(|line| !line.contains("warning") && !line.contains("simulated"));
                 lines.for_each(|line| eprintln!("{line}"));
                 let console = console.display();
                 Err(FrontError::Process(format!("a run failed with code {code}; see {console}")))
@@ -217,7 +217,7 @@ impl SliceRunner {
         if code == 0 || self.children.interrupted() {
             return Ok(());
         }
-        let said = last_lines(&file("log"), 1);
-        Err(FrontError::Process(format!("the ping-pong '{name}' failed: {said}")))
+        let output = last_lines(&file("log"), 1);
+        Err(FrontError::Process(format!("the ping-pong '{name}' failed: {output}")))
     }
 }
