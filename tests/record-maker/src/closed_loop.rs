@@ -3,7 +3,7 @@
 use super::axis::{AIR, FLOW, NORMAL, SPOOL, V, X};
 use super::noise::Stream;
 use super::numbers::Numbers;
-use super::rig::{Evaluated, Rig, STEPS_PER_MS, State};
+use super::rig::{Derivatives, Rig, STEPS_PER_MS, State};
 use super::sensing::Sensing;
 use super::{Experiment, MakeError, ROWS, Recipe, Record, Row, TrueAxis, hidden};
 use axis_control::axis::AxisController;
@@ -280,9 +280,9 @@ impl RecordedRig {
         let state = made.start(extension_m);
         for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| !made.active[*i]) {
             // A resting axis is sampled once.
-            let mut evaluated = Evaluated::default();
-            evaluated.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
-            sensing.see(made.sensed(&state, &evaluated, i));
+            let mut derivatives = Derivatives::default();
+            derivatives.air[i] = made.axes[i].air(&state.y[i], state.supply_pa);
+            sensing.store(made.sensed(&state, &derivatives, i));
         }
         Ok(RecordedRig {
             rig: made,
@@ -298,10 +298,10 @@ impl RecordedRig {
 }
 
 /// True states at the start of a period.
-fn truth(rig: &Rig, state: &State, evaluated: &Evaluated) -> [TrueAxis; 2] {
+fn truth(rig: &Rig, state: &State, derivatives: &Derivatives) -> [TrueAxis; 2] {
     [0, 1].map(|i| {
         let (axis, y) = (&rig.axes[i], &state.y[i]);
-        let air = if rig.active[i] { evaluated.air[i] } else { axis.air(y, state.supply_pa) };
+        let air = if rig.active[i] { derivatives.air[i] } else { axis.air(y, state.supply_pa) };
         let temperature = |chamber: usize| {
             let nominal_k = axis.numbers.temperature_k;
             let has_own = axis.laws.heat_w_per_m2_k.is_some();
@@ -310,7 +310,7 @@ fn truth(rig: &Rig, state: &State, evaluated: &Evaluated) -> [TrueAxis; 2] {
         TrueAxis {
             extension_m: y[X],
             rod_velocity_m_per_s: y[V],
-            rod_acceleration_m_per_s2: evaluated.rates[i][V],
+            rod_acceleration_m_per_s2: derivatives.rates[i][V],
             spool: y[SPOOL],
             pressure_pa: air.pressure_pa,
             stored_air_j: [y[AIR], y[AIR + 1]],
@@ -319,7 +319,7 @@ fn truth(rig: &Rig, state: &State, evaluated: &Evaluated) -> [TrueAxis; 2] {
             edge_flow_m3_per_s: air.edge_flow,
             exhaust_pressure_pa: air.exhaust_pa,
             pneumatic_force_n: air.force_n,
-            friction_n: evaluated.friction_n[i],
+            friction_n: derivatives.friction_n[i],
         }
     })
 }
@@ -338,8 +338,8 @@ impl SimulatedRig for RecordedRig {
         let time_s = cycle as f64 / 1000.0;
         let (rig, sensing) = (&self.rig, &mut self.sensing);
         let mut start = None;
-        rig.advance(&mut self.state, acting, sensing, |state, evaluated| {
-            start = Some((truth(rig, state, evaluated), state.supply_pa, evaluated.contact_n));
+        rig.advance(&mut self.state, acting, sensing, |state, derivatives| {
+            start = Some((truth(rig, state, derivatives), state.supply_pa, derivatives.contact_n));
         });
         let (axes, supply_pressure_pa, contact_force_n) = start.expect("a period has a first step");
         let jitter_s = self

@@ -110,13 +110,13 @@ fn check_place(recipe: &Recipe, hidden: &Hidden) -> Result<(), MakeError> {
     if !kind.places().contains(&hidden.place) {
         return refuse("it is none of the places of its sheet");
     }
-    let seen = match hidden.place.part {
+    let is_measured = match hidden.place.part {
         Part::Drive => recipe.both_axes || recipe.axis == plant::Axis::Drive,
         Part::Load => recipe.both_axes || recipe.axis == plant::Axis::Load,
         Part::Linkage => recipe.both_axes && !recipe.unlinked,
         Part::Supply => true,
     };
-    if !seen {
+    if !is_measured {
         let linkage = kind == PlaceKind::Linkage;
         return refuse(if linkage {
             "the linkage is seen with both_axes alone, and linked"

@@ -156,7 +156,8 @@ impl Motion {
     pub(super) fn sliding(&self, at: FrictionState, velocity: f64, direction: f64) -> f64 {
         let side = self.side(at.extension_m, velocity, direction);
         let viscous = self.viscous_n_s_per_m * (1.0 + side * self.laws.asymmetry) * velocity;
-        let level = self.sliding_level(at, velocity.abs(), side, direction > 0.0) + self.still_grown(at);
+        let level =
+            self.sliding_level(at, velocity.abs(), side, direction > 0.0) + self.remaining_growth_n(at);
         -direction * level - viscous
     }
 
@@ -201,13 +202,13 @@ impl Motion {
         let side = if laws.form.is_far() { self.side(at.extension_m, 0.0, direction) } else { direction };
         let mut level = self.break_away_n * (1.0 + side * laws.asymmetry) + self.on_both(at, direction > 0.0);
         if laws.rest_growth.is_some() {
-            level += self.grown(at.rest_s);
+            level += self.rest_growth_n(at.rest_s);
         }
         level.max(self.sliding_level(at, 0.0, side, direction > 0.0))
     }
 
     /// Growth of the break-away force after a rest, N.
-    fn grown(&self, rest_s: f64) -> f64 {
+    fn rest_growth_n(&self, rest_s: f64) -> f64 {
         let Some([growth, onset_s]) = self.laws.rest_growth else { return 0.0 };
         let (now, then) = (1.0 + rest_s / onset_s, 1.0 + REST_S / onset_s);
         let share = if self.laws.form == Form::Near {
@@ -219,12 +220,12 @@ impl Motion {
     }
 
     /// Remainder of the growth while the piston slides, N: in the far form the oil film rebuilds over a distance.
-    fn still_grown(&self, at: FrictionState) -> f64 {
+    fn remaining_growth_n(&self, at: FrictionState) -> f64 {
         if !self.laws.form.is_far() || self.laws.rest_growth.is_none() {
             return 0.0;
         }
         let [rest_s, from_m] = at.last_break_away;
-        self.grown(rest_s) * libm::exp(-(at.extension_m - from_m).abs() / FILM_M)
+        self.rest_growth_n(rest_s) * libm::exp(-(at.extension_m - from_m).abs() / FILM_M)
     }
 
     /// What pressure and position add to both sliding and break-away level, N.
@@ -243,12 +244,16 @@ impl Motion {
             sum += laws.pressure_slope * SEALS_AGREE_PA * grown;
         }
         if let Some(numbers) = laws.friction_over_way {
-            sum += laws.form.side(extends, BORE_DIFFERS) * self.over_way(numbers, at.extension_m);
+            sum += laws.form.side(extends, BORE_DIFFERS) * self.position_friction_n(numbers, at.extension_m);
         }
         sum
     }
 
-    fn over_way(&self, [bump, centre, width, slope, ripple, pitch]: [f64; 6], extension_m: f64) -> f64 {
+    fn position_friction_n(
+        &self,
+        [bump, centre, width, slope, ripple, pitch]: [f64; 6],
+        extension_m: f64,
+    ) -> f64 {
         let (off, mid) = ((extension_m - centre) / width, self.stroke_m / 2.0);
         let along = (extension_m - mid) / mid;
         let turn = extension_m / pitch;

@@ -175,11 +175,11 @@ fn behind_orifice(c: f64, flow: f64, pa: f64) -> f64 {
 pub(super) struct Node {
     pub(super) volume_m3: f64,
     pub(super) outside_pa: f64,
-    pub(super) passage: Passage,
+    pub(super) flow_law: FlowLaw,
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Passage {
+pub(super) enum FlowLaw {
     /// An orifice of this conductance, m^3/s per Pa.
     Orifice(f64),
     /// A flow in proportion to the difference, m^3/s per Pa.
@@ -197,41 +197,41 @@ impl Node {
     /// The supply node behind a regulator whose pressure falls by `droop_pa` at the flow of one full supply edge.
     pub(super) fn supply(numbers: &Numbers, [droop_pa, volume_m3]: [f64; 2], form: Form) -> Self {
         let (full, set_pa) = (numbers.full_flow_m3_per_s(), numbers.supply_pa);
-        let passage = match form {
-            Form::Catalogue => Passage::Orifice(full / (droop_pa * (set_pa - droop_pa)).sqrt()),
-            Form::Near => Passage::Linear(full / (LINEAR_SHARE * droop_pa)),
-            Form::Far => Passage::Quadratic(full, LINEAR_SHARE * droop_pa),
+        let flow_law = match form {
+            Form::Catalogue => FlowLaw::Orifice(full / (droop_pa * (set_pa - droop_pa)).sqrt()),
+            Form::Near => FlowLaw::Linear(full / (LINEAR_SHARE * droop_pa)),
+            Form::Far => FlowLaw::Quadratic(full, LINEAR_SHARE * droop_pa),
         };
-        Node { volume_m3, outside_pa: set_pa, passage }
+        Node { volume_m3, outside_pa: set_pa, flow_law }
     }
 
     /// The volume behind both exhaust edges, vented by a silencer of `kv_ratio` times the exhaust edge.
     pub(super) fn silencer(numbers: &Numbers, [kv_ratio, volume_m3]: [f64; 2], form: Form) -> Self {
         let c = kv_ratio * numbers.exhaust_edge_m3_per_s_pa[numbers.opening.len() - 1];
         let outside_pa = numbers.exhaust_pa;
-        let passage = match form {
-            Form::Catalogue => Passage::Orifice(c),
-            Form::Near => Passage::Sintered(c),
-            Form::Far => Passage::Porous(c),
+        let flow_law = match form {
+            Form::Catalogue => FlowLaw::Orifice(c),
+            Form::Near => FlowLaw::Sintered(c),
+            Form::Far => FlowLaw::Porous(c),
         };
-        Node { volume_m3, outside_pa, passage }
+        Node { volume_m3, outside_pa, flow_law }
     }
 
     /// Normal flow from outside into the node, m^3/s.
     #[inline(always)]
     pub(super) fn inflow(&self, node_pa: f64) -> f64 {
-        match self.passage {
-            Passage::Orifice(c) => flow(c, self.outside_pa, node_pa),
-            Passage::Linear(per_pa) => per_pa * (self.outside_pa - node_pa),
-            Passage::Quadratic(flow, at_pa) => {
+        match self.flow_law {
+            FlowLaw::Orifice(c) => flow(c, self.outside_pa, node_pa),
+            FlowLaw::Linear(per_pa) => per_pa * (self.outside_pa - node_pa),
+            FlowLaw::Quadratic(flow, at_pa) => {
                 let share = (self.outside_pa - node_pa) / at_pa;
                 flow * share * share.abs()
             }
-            Passage::Porous(c) => {
+            FlowLaw::Porous(c) => {
                 let outside_pa = self.outside_pa;
                 c / (3.0 * outside_pa) * (outside_pa * outside_pa - node_pa * node_pa)
             }
-            Passage::Sintered(c) => {
+            FlowLaw::Sintered(c) => {
                 let (up, down) = (self.outside_pa.max(node_pa), self.outside_pa.min(node_pa));
                 let beyond = ((down / up - SINTERED_RATIO) / (1.0 - SINTERED_RATIO)).max(0.0);
                 let share = (1.0 - beyond * beyond).max(0.0).sqrt();

@@ -14,7 +14,7 @@ use super::axis::{AIR, Air, Axis, EXHAUST, FLOW, LINE_LAG_SHARE, LINES_DIFFER, N
 use super::coupling::Coupling;
 use super::port::Node;
 use super::sensing::{CHANNELS, Sensing};
-use super::valve::Play;
+use super::valve::PlayState;
 use super::{Form, TrueAxis};
 
 /// Steps in a millisecond: 10 us, a tenth of the plant's substep. The docs have a table of convergence.
@@ -59,23 +59,23 @@ pub(super) struct State {
     /// Rest before the last break-away, s, and the extension at which it happened, m.
     last_break_away: [[f64; 2]; 2],
     pub(super) supply_pa: f64,
-    play: [Play; 2],
+    play: [PlayState; 2],
     late: [f64; 2],
     commands: [[f64; KEPT_COMMANDS]; 2],
-    lines: [Line; 2],
+    lines: [LineDelay; 2],
     pub(super) steps: u64,
 }
 
 /// Flow through the valve at the middle of each of the last steps.
 #[derive(Debug, Clone, Default)]
-struct Line {
+struct LineDelay {
     ring: Vec<[f64; 2]>,
     leaves: [f64; 2],
 }
 
 /// Rates and forces of both axes; those of the default are of axes at rest.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Evaluated {
+pub(super) struct Derivatives {
     pub(super) rates: [Y; 2],
     pub(super) air: [Air; 2],
     pub(super) contact_n: f64,
@@ -90,7 +90,7 @@ impl Rig {
         let line = |i: usize| {
             let longest = self.delay_steps(i).map(|[a, b]| a.max(b));
             let steps = longest.map_or(0, |steps| (steps.ceil() as usize + 2).next_power_of_two());
-            Line { ring: vec![[0.0; 2]; steps], leaves: [0.0; 2] }
+            LineDelay { ring: vec![[0.0; 2]; steps], leaves: [0.0; 2] }
         };
         State { y, supply_pa: self.axes[0].numbers.supply_pa, lines: [line(0), line(1)], ..State::default() }
     }
@@ -130,7 +130,7 @@ impl Rig {
         state: &mut State,
         commands: [f64; 2],
         sensing: &mut [Sensing; 2],
-        mut at_start: impl FnMut(&State, &Evaluated),
+        mut at_start: impl FnMut(&State, &Derivatives),
     ) {
         for (past, command) in state.commands.iter_mut().zip(commands) {
             past.rotate_right(1);
@@ -140,7 +140,7 @@ impl Rig {
             let targets = self.targets(state, step);
             let first = self.evaluate_first(state, targets);
             for (i, sensing) in sensing.iter_mut().enumerate().filter(|(i, _)| self.active[*i]) {
-                sensing.see(self.sensed(state, &first, i));
+                sensing.store(self.sensed(state, &first, i));
             }
             if step == 0 {
                 at_start(state, &first);
@@ -150,12 +150,12 @@ impl Rig {
     }
 
     /// True values of position, force and pressures of an axis, in rig coordinates.
-    pub(super) fn sensed(&self, state: &State, evaluated: &Evaluated, i: usize) -> [f64; CHANNELS] {
+    pub(super) fn sensed(&self, state: &State, derivatives: &Derivatives, i: usize) -> [f64; CHANNELS] {
         let axis = &self.axes[i];
         let x = state.y[i][X];
         let position = if i == 0 { x } else { axis.numbers.stroke_m - x };
-        let force = axis.numbers.behind_kg[i] * evaluated.rates[i][V] - evaluated.contact_n;
-        let [a, b] = evaluated.air[i].pressure_pa;
+        let force = axis.numbers.behind_kg[i] * derivatives.rates[i][V] - derivatives.contact_n;
+        let [a, b] = derivatives.air[i].pressure_pa;
         [position, force, a, b]
     }
 
@@ -199,37 +199,37 @@ impl Rig {
     }
 
     /// Evaluates the laws at the start of a step, and starts the motion of pistons that break away.
-    fn evaluate_first(&self, state: &mut State, targets: [f64; 2]) -> Evaluated {
+    fn evaluate_first(&self, state: &mut State, targets: [f64; 2]) -> Derivatives {
         let lines = [0, 1].map(|i| self.delay_steps(i).map(|_| state.lines[i].leaves));
         let time_s = self.time_s(state);
         let rest_s = [0, 1].map(|i| time_s - state.rest_since_s[i]);
         let mut direction = state.direction;
-        let at = Instant {
+        let at = StageState {
             y: &state.y,
             bristles: state.bristles,
             supply_pa: state.supply_pa,
             rest_s,
             last_break_away: state.last_break_away,
         };
-        let evaluated = self.evaluate(&at, &mut direction, targets, lines, true);
+        let derivatives = self.evaluate(&at, &mut direction, targets, lines, true);
         for i in 0..2 {
             if state.direction[i] == 0.0 && direction[i] != 0.0 {
                 state.last_break_away[i] = [rest_s[i], state.y[i][X]];
             }
         }
         state.direction = direction;
-        evaluated
+        derivatives
     }
 
     fn evaluate(
         &self,
-        at: &Instant<'_>,
+        at: &StageState<'_>,
         direction: &mut [f64; 2],
         targets: [f64; 2],
         lines: [Option<[f64; 2]>; 2],
         may_break_away: bool,
-    ) -> Evaluated {
-        let mut evaluated = Evaluated::default();
+    ) -> Derivatives {
+        let mut derivatives = Derivatives::default();
         let mut drawn = 0.0;
         for i in 0..2 {
             if !self.active[i] {
@@ -239,48 +239,48 @@ impl Rig {
             let air = axis.air(y, at.supply_pa);
             drawn += air.drawn;
             let line = lines[i].unwrap_or(air.edge_flow);
-            evaluated.rates[i] = axis.rates(y, &air, at.supply_pa, targets[i], line);
-            evaluated.air[i] = air;
+            derivatives.rates[i] = axis.rates(y, &air, at.supply_pa, targets[i], line);
+            derivatives.air[i] = air;
         }
         if let Some(node) = &self.supply {
             let normal_pa = self.axes[0].numbers.normal_pa;
-            evaluated.supply_rate = normal_pa * (node.inflow(at.supply_pa) - drawn) / node.volume_m3;
+            derivatives.supply_rate = normal_pa * (node.inflow(at.supply_pa) - drawn) / node.volume_m3;
         }
         if let Some(coupling) = &self.coupling {
             let stroke_m = self.axes[0].numbers.stroke_m;
             let [drive, load] = at.y;
-            evaluated.contact_n = coupling.force(stroke_m - drive[X] - load[X], -drive[V] - load[V]);
+            derivatives.contact_n = coupling.force(stroke_m - drive[X] - load[X], -drive[V] - load[V]);
         }
         for i in 0..2 {
             if self.active[i] {
-                self.move_axis(i, at, direction, &mut evaluated, may_break_away);
+                self.move_axis(i, at, direction, &mut derivatives, may_break_away);
             }
         }
-        evaluated
+        derivatives
     }
 
     #[inline(always)]
     fn move_axis(
         &self,
         i: usize,
-        at: &Instant<'_>,
+        at: &StageState<'_>,
         direction: &mut [f64; 2],
-        evaluated: &mut Evaluated,
+        derivatives: &mut Derivatives,
         may_break_away: bool,
     ) {
         let (axis, y) = (&self.axes[i], &at.y[i]);
         let motion = &axis.motion;
-        let place = axis.at(y, &evaluated.air[i], at.rest_s[i], at.last_break_away[i]);
-        let pushed_n = evaluated.air[i].force_n + motion.pushes(y[X]) + evaluated.contact_n;
+        let place = axis.at(y, &derivatives.air[i], at.rest_s[i], at.last_break_away[i]);
+        let pushed_n = derivatives.air[i].force_n + motion.pushes(y[X]) + derivatives.contact_n;
         let stroke_m = axis.numbers.stroke_m;
         let pressed = |force: f64| y[X] <= 0.0 && force < 0.0 || y[X] >= stroke_m && force > 0.0;
         if motion.laws.presliding.is_some() {
             let friction_n = motion.bristles(place, y[V], at.bristles[i]);
             let sum = pushed_n + friction_n;
             let held = y[V] == 0.0 && pressed(sum);
-            evaluated.friction_n[i] = friction_n;
-            evaluated.rates[i][X] = if held { 0.0 } else { y[V] };
-            evaluated.rates[i][V] = if held { 0.0 } else { sum / motion.mass_kg };
+            derivatives.friction_n[i] = friction_n;
+            derivatives.rates[i][X] = if held { 0.0 } else { y[V] };
+            derivatives.rates[i][V] = if held { 0.0 } else { sum / motion.mass_kg };
             return;
         }
         if direction[i] == 0.0 && may_break_away && !pressed(pushed_n) {
@@ -290,17 +290,17 @@ impl Rig {
             }
         }
         if direction[i] == 0.0 {
-            evaluated.friction_n[i] = -pushed_n;
+            derivatives.friction_n[i] = -pushed_n;
             return;
         }
         let friction_n = motion.sliding(place, y[V], direction[i]);
-        evaluated.friction_n[i] = friction_n;
-        evaluated.rates[i][X] = y[V];
-        evaluated.rates[i][V] = (pushed_n + friction_n) / motion.mass_kg;
+        derivatives.friction_n[i] = friction_n;
+        derivatives.rates[i][X] = y[V];
+        derivatives.rates[i][V] = (pushed_n + friction_n) / motion.mass_kg;
     }
 
     /// Advances by one step from the evaluation at its start.
-    fn step(&self, state: &mut State, targets: [f64; 2], first: &Evaluated) {
+    fn step(&self, state: &mut State, targets: [f64; 2], first: &Derivatives) {
         let h = self.step_s();
         let rest_s = [0, 1].map(|i| self.time_s(state) - state.rest_since_s[i]);
         let mut y = state.y;
@@ -316,9 +316,9 @@ impl Rig {
             }
         }
         let supply_pa = state.supply_pa + h / 2.0 * first.supply_rate;
-        let lines = [0, 1].map(|i| self.leaving(state, i, &y[i], supply_pa));
+        let lines = [0, 1].map(|i| self.line_outflow(state, i, &y[i], supply_pa));
         let mut direction = state.direction;
-        let at = Instant { y: &y, bristles, supply_pa, rest_s, last_break_away: state.last_break_away };
+        let at = StageState { y: &y, bristles, supply_pa, rest_s, last_break_away: state.last_break_away };
         let middle =
             if self.first_order { *first } else { self.evaluate(&at, &mut direction, targets, lines, false) };
         for i in 0..2 {
@@ -336,7 +336,7 @@ impl Rig {
                 let place = axis.at(&y[i], &middle.air[i], rest_s[i], state.last_break_away[i]);
                 state.bristles[i] = axis.motion.deflect(place, y[i][V], state.bristles[i], h);
             }
-            self.catch(state, i, &from);
+            self.stick_or_stop(state, i, &from);
             let after_pa = state.supply_pa + h * middle.supply_rate;
             bound(axis, &mut state.y[i], &from, [state.supply_pa, after_pa]);
         }
@@ -345,7 +345,7 @@ impl Rig {
     }
 
     /// Flow out of the lines of an axis at the middle of this step; stores what enters them.
-    fn leaving(&self, state: &mut State, i: usize, y: &Y, supply_pa: f64) -> Option<[f64; 2]> {
+    fn line_outflow(&self, state: &mut State, i: usize, y: &Y, supply_pa: f64) -> Option<[f64; 2]> {
         let delay = self.delay_steps(i).filter(|_| self.active[i])?;
         let enters = self.axes[i].air(y, supply_pa).edge_flow;
         let now = state.steps as usize;
@@ -366,7 +366,7 @@ impl Rig {
 
     /// Sticks a piston whose velocity changed sign within the step, and stops one at the ends.
     #[inline(always)]
-    fn catch(&self, state: &mut State, i: usize, from: &Y) {
+    fn stick_or_stop(&self, state: &mut State, i: usize, from: &Y) {
         let axis = &self.axes[i];
         let end_s = (state.steps + 1) as f64 * self.step_s();
         let y = &mut state.y[i];
@@ -394,7 +394,7 @@ impl Rig {
     }
 }
 
-struct Instant<'a> {
+struct StageState<'a> {
     y: &'a [Y; 2],
     bristles: [f64; 2],
     supply_pa: f64,

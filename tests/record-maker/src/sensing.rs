@@ -130,7 +130,7 @@ impl Sensing {
 
     /// Stores the true values at the start of a step.
     #[inline(always)]
-    pub(super) fn see(&mut self, truth: [f64; CHANNELS]) {
+    pub(super) fn store(&mut self, truth: [f64; CHANNELS]) {
         let first = self.steps == 0;
         let mut shown = truth;
         for (channel, shown) in shown.iter_mut().enumerate() {
@@ -157,10 +157,10 @@ impl Sensing {
                 Form::Near => (1.0 - AGE_LAG_SHARE) * laws.age_s[channel] - late_s,
                 Form::Far => self.far_age_s(channel, at as f64 * self.step_s + late_s) - late_s,
             };
-            let truth = self.seen(channel, at as f64 - back_s / self.step_s);
+            let truth = self.delayed(channel, at as f64 - back_s / self.step_s);
             let mounted = if channel == 0 { self.mounted_m } else { 0.0 };
             truth
-                + self.gained(channel, truth, time_s)
+                + self.gain_error(channel, truth, time_s)
                 + laws.offset[channel] * laws.form.drift(time_s, DRIFTS[channel])
                 + mounted
         })
@@ -177,7 +177,7 @@ impl Sensing {
         age_s + held_s
     }
 
-    fn seen(&self, channel: usize, step: f64) -> f64 {
+    fn delayed(&self, channel: usize, step: f64) -> f64 {
         let last = self.steps - 1;
         let oldest = self.steps.saturating_sub(self.ring.len());
         let step = step.clamp(oldest as f64, last as f64);
@@ -187,7 +187,7 @@ impl Sensing {
         one + (step - before as f64) * (other - one)
     }
 
-    fn gained(&self, channel: usize, truth: f64, time_s: f64) -> f64 {
+    fn gain_error(&self, channel: usize, truth: f64, time_s: f64) -> f64 {
         let laws = &self.laws;
         let gain = laws.gain[channel];
         if !self.laws.form.is_foreign() || gain == 0.0 {

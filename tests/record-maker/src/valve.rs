@@ -44,7 +44,7 @@ pub(super) struct Valve {
 
 /// State of the play between command and spool.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Play {
+pub(super) struct PlayState {
     command: f64,
     /// Lag of its output behind the command.
     lag: f64,
@@ -60,7 +60,7 @@ impl Valve {
     }
 
     /// Target position of the spool for the acting command. To be called once a step, since it updates the play.
-    pub(super) fn target(&self, command: f64, play: &mut Play, drift: f64) -> f64 {
+    pub(super) fn target(&self, command: f64, play: &mut PlayState, drift: f64) -> f64 {
         let moved = command - play.command;
         let half = self.laws.form.side(command > 0.0, SOLENOIDS_DIFFER) * self.laws.play;
         play.command = command;

@@ -11,7 +11,7 @@ use crate::draws::Shape;
 use crate::interval::Rate;
 use crate::leave_out::tables::Split as LeftSplit;
 use crate::score::Score;
-use crate::score::tables::{Line, Split, Spread};
+use crate::score::tables::{Line, QuantileSummary, Split};
 use std::fmt::Write;
 
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -86,7 +86,7 @@ pub(crate) fn line_cell(line: &Line) -> String {
     if line.is_low() { bound_cell(&line.rate) } else { reported(&line.rate) }
 }
 
-fn quantile(spread: &Spread, at: usize, scale: f64, unit: &str) -> String {
+fn quantile(spread: &QuantileSummary, at: usize, scale: f64, unit: &str) -> String {
     spread.quantiles.map_or("none".to_owned(), |all| format!("{:.1} {unit}", all[at] * scale))
 }
 
@@ -114,7 +114,7 @@ fn figures(scores: &[Score]) -> Vec<Row> {
             ("the same, all numbers, another form", "", |score| &score.tables.numbers.foreign_covered),
         ];
         rows.extend(rates.map(|(name, wanted, pick)| row(name, wanted, &|score| reported(pick(score)))));
-        type Figure = fn(&Score) -> &Spread;
+        type Figure = fn(&Score) -> &QuantileSummary;
         let medians: [(&str, &str, Figure); 4] = [
             ("amplitude off by, of itself, median", "", |score| &score.tables.numbers.off_ratio),
             ("its standard error, of itself, median", "below 25 %", |score| {

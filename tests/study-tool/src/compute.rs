@@ -95,7 +95,7 @@ pub fn classes(
 ) -> Result<(), ComputeError> {
     let is_done = |number| done.is_none_or(|label| study.run(label, number).join("result.json").exists());
     let is_missing = |draw: &&Draw| !study.class(draw.number).exists() && is_done(draw.number);
-    let missing: Vec<&Draw> = hiding(study).filter(is_missing).collect();
+    let missing: Vec<&Draw> = draws_with_effects(study).filter(is_missing).collect();
     let pool = ThreadPoolBuilder::new().num_threads(jobs.max(1)).build()?;
     let computed = AtomicUsize::new(0);
     let all = missing.len();
@@ -104,18 +104,18 @@ pub fn classes(
             if stop.load(Ordering::Relaxed) {
                 return Ok(());
             }
-            one(study, draw)?;
+            compute_classes(study, draw)?;
             say(&format!("classes {} of {all}", computed.fetch_add(1, Ordering::Relaxed) + 1));
             Ok(())
         })
     })
 }
 
-fn hiding(study: &Study) -> impl Iterator<Item = &Draw> {
+fn draws_with_effects(study: &Study) -> impl Iterator<Item = &Draw> {
     study.draws.iter().filter(|draw| !draw.recipe.hidden.is_empty())
 }
 
-fn one(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
+fn compute_classes(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
     let (number, rig) = (draw.number, RigParameters::baseline());
     let record = simulate(&draw.recipe, &rig).map_err(|error| ComputeError::Make { number, error })?;
     let mut classes = classes_of(draw, trajectory(&record, &rig))?;
@@ -133,12 +133,12 @@ fn one(study: &Study, draw: &Draw) -> Result<(), ComputeError> {
 /// # Errors
 /// [`ComputeError::Missing`] when draws have no classes yet, [`ComputeError::Folder`] when a file cannot be read.
 pub fn collected(study: &Study) -> Result<Classes, ComputeError> {
-    let count = hiding(study).filter(|draw| !study.class(draw.number).exists()).count();
+    let count = draws_with_effects(study).filter(|draw| !study.class(draw.number).exists()).count();
     if count > 0 {
         return Err(ComputeError::Missing { count });
     }
     let read = |draw: &Draw| read_draw(&study.class(draw.number), draw.number);
-    let draws = hiding(study).map(read).collect::<Result<Vec<DrawClasses>, _>>()?;
+    let draws = draws_with_effects(study).map(read).collect::<Result<Vec<DrawClasses>, _>>()?;
     Ok(Classes { plan: study.plan, draws })
 }
 

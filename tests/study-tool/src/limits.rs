@@ -202,10 +202,11 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
         Ok::<_, ParameterError>(length(&observer.signature(&rig)) / threshold)
     };
     let (limit_value, strength) = if scale == Scale::None {
-        (None, weakest(key, strength_at)?)
+        (None, weakest_strength(key, strength_at)?)
     } else {
-        let ends = Ends { least: scale.least(key), most: scale.most(key)[0], drawn: scale.most(key)[1] };
-        let (limit, strength) = search(&ends, |excursion| strength_at(scale.value(excursion)))?;
+        let range =
+            SearchRange { least: scale.least(key), most: scale.most(key)[0], drawn: scale.most(key)[1] };
+        let (limit, strength) = search(&range, |excursion| strength_at(scale.value(excursion)))?;
         (limit.map(|excursion| scale.value(excursion)), strength)
     };
     Ok(Limit {
@@ -220,7 +221,7 @@ fn limit(observer: &Observer, sheet: &Sheet, place: Place, scale: Scale) -> Resu
     })
 }
 
-fn weakest(
+fn weakest_strength(
     key: &EffectKey,
     strength_at: impl Fn(f64) -> Result<f64, ParameterError>,
 ) -> Result<f64, ParameterError> {
@@ -232,8 +233,8 @@ fn weakest(
     })
 }
 
-/// Excursions between which a limit is searched.
-struct Ends {
+/// Range of excursions in which a limit is searched.
+struct SearchRange {
     least: f64,
     /// Strongest that a file allows.
     most: f64,
@@ -242,8 +243,11 @@ struct Ends {
 
 /// The excursion at which the strength crosses 1, searched from the strongest drawn one, down to the least or up to the most; and
 /// the strength at the drawn one.
-fn search<E>(ends: &Ends, strength_at: impl Fn(f64) -> Result<f64, E>) -> Result<(Option<f64>, f64), E> {
-    let &Ends { least, most, drawn } = ends;
+fn search<E>(
+    range: &SearchRange,
+    strength_at: impl Fn(f64) -> Result<f64, E>,
+) -> Result<(Option<f64>, f64), E> {
+    let &SearchRange { least, most, drawn } = range;
     let strength = strength_at(drawn)?;
     let least = least.max(drawn * LEAST_SHARE);
     let (beyond, mut low, mut high) =
@@ -297,8 +301,8 @@ mod tests {
 
     #[test]
     fn the_search_finds_where_the_strength_passes_one() {
-        let ends = Ends { least: 0.0, most: 100.0, drawn: 10.0 };
-        let find = |law: fn(f64) -> f64| search(&ends, |at| Ok::<_, ()>(law(at))).unwrap().0;
+        let range = SearchRange { least: 0.0, most: 100.0, drawn: 10.0 };
+        let find = |law: fn(f64) -> f64| search(&range, |at| Ok::<_, ()>(law(at))).unwrap().0;
         for law in [|at| at / 3.0, |at: f64| (at / 3.0).powi(2), |at: f64| (at / 3.0).sqrt()] {
             let found = find(law).unwrap();
             assert!((3.0..=3.0 * PRECISION * PRECISION).contains(&found), "{found}");

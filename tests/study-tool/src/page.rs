@@ -6,7 +6,7 @@
 use crate::draws::Shape;
 use crate::interval::Rate;
 use crate::program::Identity;
-use crate::score::tables::{ConfusionRow, OTHER_COLUMNS, Split, Spread};
+use crate::score::tables::{ConfusionRow, OTHER_COLUMNS, QuantileSummary, Split};
 use crate::score::{Case, Score};
 use pagekit::page::{document, escaped};
 use plant::effects::SHEETS;
@@ -193,7 +193,7 @@ fn nothing_hidden(score: &Score) -> String {
     table(&["hidden", "cases", "called"], score.tables.nothing_hidden.iter().map(row))
 }
 
-fn spread(name: &str, spread: &Spread, scale: f64, unit: &str) -> Vec<String> {
+fn spread(name: &str, spread: &QuantileSummary, scale: f64, unit: &str) -> Vec<String> {
     let quantile = |at: usize| {
         spread.quantiles.map_or("<span class=\"none\">none</span>".to_owned(), |all| {
             format!("{:.1} {unit}", all[at] * scale)

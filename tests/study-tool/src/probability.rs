@@ -35,9 +35,10 @@ pub(crate) struct JudgedExplanation {
 }
 
 /// The explanations with the probabilities of the marginal likelihood; `None` where the report has none.
-pub(crate) fn by_marginal(said: &[JudgedExplanation]) -> Option<Vec<JudgedExplanation>> {
-    let own = |said: &JudgedExplanation| Some(JudgedExplanation { probability: said.marginal?, ..*said });
-    said.iter().map(own).collect::<Option<Vec<JudgedExplanation>>>().filter(|said| !said.is_empty())
+pub(crate) fn by_marginal(stated: &[JudgedExplanation]) -> Option<Vec<JudgedExplanation>> {
+    let own =
+        |stated: &JudgedExplanation| Some(JudgedExplanation { probability: stated.marginal?, ..*stated });
+    stated.iter().map(own).collect::<Option<Vec<JudgedExplanation>>>().filter(|stated| !stated.is_empty())
 }
 
 pub(crate) fn judge(
@@ -53,17 +54,17 @@ pub(crate) fn judge(
         ExplanationKind::Null => alone && recipe.wrong_parameters.is_empty(),
         ExplanationKind::Parameters => alone && !recipe.wrong_parameters.is_empty(),
         ExplanationKind::Effects => {
-            !alone && explanation.sets.iter().any(|set| stand_for(set, &recipe.hidden, classes))
+            !alone && explanation.sets.iter().any(|set| match_hidden(set, &recipe.hidden, classes))
         }
         ExplanationKind::NoneOfThese => alone && recipe.background.is_some(),
     };
-    let said = |explanation: &Explanation| JudgedExplanation {
+    let stated = |explanation: &Explanation| JudgedExplanation {
         probability: explanation.probability,
         marginal: explanation.marginal.map(|own| own.probability),
         right: is_right(explanation),
     };
-    let mut judged: Vec<JudgedExplanation> = report.explanations.iter().map(said).collect();
-    let any = judged.iter().any(|said| said.right);
+    let mut judged: Vec<JudgedExplanation> = report.explanations.iter().map(stated).collect();
+    let any = judged.iter().any(|stated| stated.right);
     let fallen = report.explanations.iter().position(|own| own.kind == ExplanationKind::NoneOfThese);
     if let Some(none) = fallen.filter(|_| !any) {
         judged[none].right = true;
@@ -72,14 +73,14 @@ pub(crate) fn judge(
 }
 
 /// Whether the effects of a set match the hidden ones one to one.
-fn stand_for(set: &[EffectPlace], hidden: &[Hidden], classes: &[Vec<Member>]) -> bool {
+fn match_hidden(set: &[EffectPlace], hidden: &[Hidden], classes: &[Vec<Member>]) -> bool {
     let Some(first) = set.first().filter(|_| set.len() == hidden.len()) else { return hidden.is_empty() };
     (0..hidden.len()).any(|at| {
         let (mut others, mut twins) = (hidden.to_vec(), classes.to_vec());
         twins.resize(hidden.len(), Vec::new());
         let (own, class) = (others.remove(at), twins.remove(at));
         is_of_class(&first.effect, &first.place.to_string(), &own, &class)
-            && stand_for(&set[1..], &others, &twins)
+            && match_hidden(&set[1..], &others, &twins)
     })
 }
 
@@ -90,7 +91,8 @@ pub(crate) struct Bin {
     pub(crate) between: [f64; 2],
     pub(crate) explanations: usize,
     /// Weighted means.
-    pub(crate) said: f64,
+    #[serde(rename = "said")]
+    pub(crate) stated: f64,
     pub(crate) right: f64,
     /// Simultaneous over the bins at 95 %: Wilson's interval at the Bonferroni level, for the effective number. It assumes that
     /// the explanations of one report are independent, which they are not: it is too narrow.
@@ -98,9 +100,9 @@ pub(crate) struct Bin {
 }
 
 /// The explanations of a report as mutually exclusive events: right ones are one event.
-fn events(said: &[JudgedExplanation]) -> impl Iterator<Item = JudgedExplanation> {
-    let wrong = said.iter().copied().filter(|said| !said.right);
-    let right = said.iter().filter(|said| said.right).map(|said| said.probability);
+fn events(stated: &[JudgedExplanation]) -> impl Iterator<Item = JudgedExplanation> {
+    let wrong = stated.iter().copied().filter(|stated| !stated.right);
+    let right = stated.iter().filter(|stated| stated.right).map(|stated| stated.probability);
     let both = right.reduce(|one, other| one + other);
     wrong.chain(both.map(|probability| JudgedExplanation { probability, marginal: None, right: true }))
 }
@@ -109,7 +111,7 @@ fn events(said: &[JudgedExplanation]) -> impl Iterator<Item = JudgedExplanation>
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(crate) struct Reliability {
     pub(crate) bins: Vec<Bin>,
-    /// Weighted mean of |said - right| of the bins.
+    /// Weighted mean of |stated - right| of the bins.
     pub(crate) calibration_error: f64,
     /// Reports whose most probable explanation is right, and all reports.
     pub(crate) first_right: [usize; 2],
@@ -127,7 +129,7 @@ impl Reliability {
 
     /// Reliability of reports with the kinds of their draws, weighted so that nothing hidden has a third of the weight.
     pub(crate) fn of(reports: &[(Kind, &[JudgedExplanation])]) -> Self {
-        let given: Vec<_> = reports.iter().filter(|(_, said)| !said.is_empty()).collect();
+        let given: Vec<_> = reports.iter().filter(|(_, stated)| !stated.is_empty()).collect();
         let is_null = |kind: Kind| matches!(kind, Kind::Null | Kind::Parameter);
         let nulls = given.iter().filter(|(kind, _)| is_null(*kind)).count();
         let others = given.len() - nulls;
@@ -136,24 +138,27 @@ impl Reliability {
             _ if is_null(kind) => NULL_SHARE / nulls as f64,
             _ => (1.0 - NULL_SHARE) / others as f64,
         };
-        let mut all: Vec<(f64, JudgedExplanation)> =
-            given.iter().flat_map(|(kind, said)| events(said).map(|event| (weight(*kind), event))).collect();
+        let mut all: Vec<(f64, JudgedExplanation)> = given
+            .iter()
+            .flat_map(|(kind, stated)| events(stated).map(|event| (weight(*kind), event)))
+            .collect();
         all.sort_by(|left, right| left.1.probability.total_cmp(&right.1.probability));
         let parts = parts(&all);
         let bins: Vec<Bin> = parts.iter().map(|part| bin(part, parts.len())).collect();
         let weight_of =
             |part: &[(f64, JudgedExplanation)]| part.iter().map(|(weight, _)| weight).sum::<f64>();
         let errors =
-            bins.iter().zip(&parts).map(|(bin, part)| (bin.said - bin.right).abs() * weight_of(part));
-        let first = |said: &[JudgedExplanation]| {
-            said.iter().copied().max_by(|a, b| a.probability.total_cmp(&b.probability))
+            bins.iter().zip(&parts).map(|(bin, part)| (bin.stated - bin.right).abs() * weight_of(part));
+        let first = |stated: &[JudgedExplanation]| {
+            stated.iter().copied().max_by(|a, b| a.probability.total_cmp(&b.probability))
         };
-        let right = given.iter().filter(|(_, said)| first(said).is_some_and(|said| said.right)).count();
-        let loss = |said: &[JudgedExplanation]| {
-            let of_right = events(said).filter(|event| event.right).map(|event| event.probability);
+        let right =
+            given.iter().filter(|(_, stated)| first(stated).is_some_and(|stated| stated.right)).count();
+        let loss = |stated: &[JudgedExplanation]| {
+            let of_right = events(stated).filter(|event| event.right).map(|event| event.probability);
             -of_right.sum::<f64>().max(LEAST_PROBABILITY).ln()
         };
-        let losses: f64 = given.iter().map(|(_, said)| loss(said)).sum();
+        let losses: f64 = given.iter().map(|(_, stated)| loss(stated)).sum();
         Reliability {
             calibration_error: errors.sum::<f64>() / weight_of(&all),
             bins,
@@ -167,7 +172,7 @@ impl Reliability {
 fn parts(all: &[(f64, JudgedExplanation)]) -> Vec<&[(f64, JudgedExplanation)]> {
     let mut cuts = vec![0];
     for edge in EDGES {
-        let at = all.partition_point(|(_, said)| said.probability < edge);
+        let at = all.partition_point(|(_, stated)| stated.probability < edge);
         if at >= cuts[cuts.len() - 1] + LEAST_IN_BIN {
             cuts.push(at);
         }
@@ -182,12 +187,12 @@ fn parts(all: &[(f64, JudgedExplanation)]) -> Vec<&[(f64, JudgedExplanation)]> {
 fn bin(part: &[(f64, JudgedExplanation)], of: usize) -> Bin {
     let sum = |value: &dyn Fn(&(f64, JudgedExplanation)) -> f64| part.iter().map(value).sum::<f64>();
     let total = sum(&|(weight, _)| *weight);
-    let right = sum(&|(weight, said)| weight * f64::from(said.right)) / total;
+    let right = sum(&|(weight, stated)| weight * f64::from(stated.right)) / total;
     let effective = total * total / sum(&|(weight, _)| weight * weight);
     Bin {
         between: [part[0].1.probability, part[part.len() - 1].1.probability],
         explanations: part.len(),
-        said: sum(&|(weight, said)| weight * said.probability) / total,
+        stated: sum(&|(weight, stated)| weight * stated.probability) / total,
         right,
         band: wilson(right * effective, effective, 1.0 - (1.0 - CONFIDENCE) / of as f64),
     }
@@ -205,17 +210,18 @@ mod tests {
             .unwrap()
     }
 
-    fn said(probability: f64, right: bool) -> JudgedExplanation {
+    fn stated(probability: f64, right: bool) -> JudgedExplanation {
         JudgedExplanation { probability, marginal: Some(0.5), right }
     }
 
     #[test]
     fn a_log_loss_is_of_what_is_right_by_each_rule() {
-        let report = [said(0.1, true), said(0.7, false), said(0.2, true)];
-        let loss = |said: &[JudgedExplanation]| Reliability::of(&[(Kind::Single, said)]).log_loss.unwrap();
+        let report = [stated(0.1, true), stated(0.7, false), stated(0.2, true)];
+        let loss =
+            |stated: &[JudgedExplanation]| Reliability::of(&[(Kind::Single, stated)]).log_loss.unwrap();
         assert!((loss(&report) + 0.3_f64.ln()).abs() < 1e-12);
         assert!(loss(&by_marginal(&report[..2]).unwrap()) - 2.0_f64.ln() < 1e-12);
-        assert!(loss(&[said(0.0, true), said(1.0, false)]) < 14.0);
+        assert!(loss(&[stated(0.0, true), stated(1.0, false)]) < 14.0);
         let without = JudgedExplanation { marginal: None, ..report[0] };
         assert!(by_marginal(&[report[1], without]).is_none() && by_marginal(&[]).is_none());
     }
@@ -231,7 +237,7 @@ mod tests {
             json!({"effect": hidden.name, "where": {"axis": axis, "element": element}})
         };
         let [one, other] = [&pair.recipe.hidden[0], &pair.recipe.hidden[1]].map(effect);
-        let said = |draw: &Draw, left_out| {
+        let stated = |draw: &Draw, left_out| {
             let explanations = json!([
                 {"kind": "nothing", "sets": [], "probability": 0.1},
                 {"kind": "effects", "sets": [[one.clone()]], "probability": 0.2},
@@ -240,16 +246,16 @@ mod tests {
             ]);
             judge(draw, &[], left_out, &report(&explanations))
                 .iter()
-                .map(|said| said.right)
+                .map(|stated| stated.right)
                 .collect::<Vec<_>>()
         };
-        assert_eq!(said(pair, false), [false, false, true, false]);
-        assert_eq!(said(pair, true), [false, false, false, true]);
+        assert_eq!(stated(pair, false), [false, false, true, false]);
+        assert_eq!(stated(pair, true), [false, false, false, true]);
         let null = all.iter().find(|draw| draw.kind == Kind::Null && draw.recipe.wrong_parameters.is_empty());
-        assert_eq!(said(null.unwrap(), false), [true, false, false, false]);
+        assert_eq!(stated(null.unwrap(), false), [true, false, false, false]);
         // Nothing of what was said is so.
         let parameter = all.iter().find(|draw| draw.kind == Kind::Parameter).unwrap();
-        assert_eq!(said(parameter, false), [false, false, false, true]);
+        assert_eq!(stated(parameter, false), [false, false, false, true]);
     }
 
     #[test]
@@ -259,12 +265,12 @@ mod tests {
             (0..80)
                 .map(|at| {
                     let first = at % 4 < right;
-                    vec![said(0.75, first), said(0.25, !first)]
+                    vec![stated(0.75, first), stated(0.25, !first)]
                 })
                 .collect()
         };
         let reliability = |reports: &[Vec<JudgedExplanation>]| {
-            Reliability::of(&reports.iter().map(|said| (Kind::Single, &said[..])).collect::<Vec<_>>())
+            Reliability::of(&reports.iter().map(|stated| (Kind::Single, &stated[..])).collect::<Vec<_>>())
         };
         let good = reliability(&of(3));
         assert!(good.calibration_error < 1e-12 && good.bins.len() == 2, "{good:?}");
@@ -285,14 +291,14 @@ mod tests {
     #[test]
     fn no_calibration_error_is_shown_where_no_bin_is_high() {
         // 64 and 64 events below one half, in two bins: their means say nothing of what is said at 90 %.
-        let report = [said(0.45, true), said(0.45, false), said(0.05, false), said(0.05, false)];
+        let report = [stated(0.45, true), stated(0.45, false), stated(0.05, false), stated(0.05, false)];
         let low = Reliability::of(&[(Kind::Single, &report[..]); 32]);
         assert_eq!((low.bins.len(), low.shown_error()), (2, None));
     }
 
     #[test]
     fn explanations_that_are_right_together_are_one_event() {
-        let background = [said(0.3, true), said(0.1, false), said(0.6, true)];
+        let background = [stated(0.3, true), stated(0.1, false), stated(0.6, true)];
         let events: Vec<JudgedExplanation> = events(&background).collect();
         assert_eq!(events.len(), 2);
         assert!(!events[0].right && events[1].right && (events[1].probability - 0.9).abs() < 1e-12);
@@ -300,7 +306,7 @@ mod tests {
 
     #[test]
     fn a_third_of_the_weight_is_of_records_with_nothing_hidden() {
-        let [right, wrong] = [true, false].map(|right| vec![said(0.5, right)]);
+        let [right, wrong] = [true, false].map(|right| vec![stated(0.5, right)]);
         let mut reports: Vec<(Kind, &[JudgedExplanation])> = vec![(Kind::Null, &right); 90];
         reports.extend(vec![(Kind::Single, &wrong[..]); 10]);
         let bins = Reliability::of(&reports).bins;

@@ -76,7 +76,7 @@ pub struct Execution {
 }
 
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Start<'a> {
+pub(crate) struct ProgramInputs<'a> {
     pub(crate) folder: &'a Path,
     pub(crate) train: &'a [&'a str],
     /// Arguments after those of every run.
@@ -107,7 +107,7 @@ impl Program {
     /// [`Interrupted`] when `stop` is set before it has ended.
     pub(crate) fn run(
         &self,
-        start: &Start<'_>,
+        start: &ProgramInputs<'_>,
         said: File,
         stop: &AtomicBool,
     ) -> Result<Execution, Interrupted> {
@@ -182,7 +182,7 @@ pub(crate) mod tests {
         let folder = tempfile::tempdir().unwrap();
         let program = script(folder.path(), text, &[], limit);
         let said = File::create(folder.path().join("said")).unwrap();
-        let start = Start { folder: folder.path(), train: &["train.csv"], arguments: &[] };
+        let start = ProgramInputs { folder: folder.path(), train: &["train.csv"], arguments: &[] };
         program.run(&start, said, &AtomicBool::new(stop))
     }
 

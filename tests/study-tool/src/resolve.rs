@@ -24,7 +24,7 @@ pub mod tables;
 use crate::SCHEMA_VERSION;
 use crate::draws::{Draw, Kind};
 use crate::folder::{FolderError, read, read_versioned};
-use crate::program::{Execution, Identity, Program, ProgramEnd, Start};
+use crate::program::{Execution, Identity, Program, ProgramEnd, ProgramInputs};
 use crate::report::{self, Named, Report, Verdict};
 use crate::step::{Step, StepError, check_blind, check_program, read_result, whole_run};
 use plant::RigParameters;
@@ -186,7 +186,8 @@ fn resolve(
         Err(problem) => resolution.problem = Some(problem),
         Ok(()) => {
             check_blind(number, &empty.path().join("next.csv"))?;
-            let start = Start { folder: empty.path(), train: &["train.csv", "next.csv"], arguments: &[] };
+            let start =
+                ProgramInputs { folder: empty.path(), train: &["train.csv", "next.csv"], arguments: &[] };
             let Some(taken) = step.start(number, program, &start, folder)? else { return Ok(None) };
             resolution.taken = Some(taken);
         }
@@ -211,7 +212,7 @@ fn proposal(
     // It was not kept: equal records give an equal report with the same experiment file.
     let [empty, folder] = [tempfile::tempdir().map_err(files)?, tempfile::tempdir().map_err(files)?];
     step.copy_inputs(draw, empty.path())?;
-    let start = Start { folder: empty.path(), train: &["train.csv"], arguments: &[] };
+    let start = ProgramInputs { folder: empty.path(), train: &["train.csv"], arguments: &[] };
     if step.start(number, program, &start, folder.path())?.is_none() {
         return Ok(None);
     }

@@ -112,7 +112,7 @@ impl Observer {
         let mut run = Run::default();
         for (at, row) in rows.iter().enumerate() {
             for axis in &measured {
-                let of = |row: &Row| (way(row.axes[*axis].rod_velocity_m_per_s), touches(row));
+                let of = |row: &Row| (direction(row.axes[*axis].rod_velocity_m_per_s), touches(row));
                 let near = [at.saturating_sub(1), (at + 1).min(whole - 1)];
                 let jumps = near.iter().any(|near| of(&rows[*near]) != of(row));
                 run.readings
@@ -269,10 +269,10 @@ fn basis(columns: &[f64], without: &[bool]) -> Vec<Vec<f64>> {
 
 /// Direction of motion of an axis, and whether the rods are in contact.
 fn phase(truth: &Truth, axis: usize) -> (i8, bool) {
-    (way(truth.axes[axis].rod_velocity_m_per_s), truth.contact_force_n != 0.0)
+    (direction(truth.axes[axis].rod_velocity_m_per_s), truth.contact_force_n != 0.0)
 }
 
-fn way(velocity_m_per_s: f64) -> i8 {
+fn direction(velocity_m_per_s: f64) -> i8 {
     if velocity_m_per_s.abs() < REST_M_PER_S { 0 } else { velocity_m_per_s.signum() as i8 }
 }
 

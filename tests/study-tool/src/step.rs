@@ -9,7 +9,7 @@ use crate::SCHEMA_VERSION;
 use crate::draws::Draw;
 use crate::folder::{FolderError, Study, make_whole, read_versioned};
 use crate::leave_out;
-use crate::program::{Execution, Identity, Interrupted, Program, Start};
+use crate::program::{Execution, Identity, Interrupted, Program, ProgramInputs};
 use crate::report::{self, Report};
 use plant::RigParameters;
 use record_maker::{Experiment, Recipe};
@@ -200,7 +200,7 @@ impl Step<'_> {
         self.copy_inputs(draw, empty.path())?;
         let without = self.without.clone().unwrap_or_default();
         let arguments = leave_out::arguments(&without);
-        let start = Start { folder: empty.path(), train: &["train.csv"], arguments: &arguments };
+        let start = ProgramInputs { folder: empty.path(), train: &["train.csv"], arguments: &arguments };
         let Some(taken) = self.start(number, program, &start, folder)? else { return Ok(None) };
         let program = self.identity(program);
         let result = RunResult { schema_version: SCHEMA_VERSION, number, program, taken, without };
@@ -231,7 +231,7 @@ impl Step<'_> {
         &self,
         number: usize,
         program: &Program,
-        start: &Start<'_>,
+        start: &ProgramInputs<'_>,
         folder: &Path,
     ) -> Result<Option<Execution>, StepError> {
         let files = |error| StepError::Files { number, error };

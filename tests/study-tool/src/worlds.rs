@@ -6,7 +6,7 @@ use crate::interval::Rate;
 use crate::leave_out::LeaveOutJudgement;
 use crate::leave_out::tables::STILL_CLOSED;
 use crate::probability::{JudgedExplanation, Reliability, by_marginal};
-use crate::score::tables::{Spread, hidden, is_clear, over_limit};
+use crate::score::tables::{QuantileSummary, hidden, is_clear, over_limit};
 use crate::score::{Case, Score};
 use crate::target::{Outcome, Target};
 use serde::Serialize;
@@ -35,10 +35,10 @@ pub struct Worlds {
     pub(crate) reliability: [Reliability; 2],
     /// The same for reports that state marginal likelihoods: with the stated probabilities, and with those.
     pub(crate) rules: [[Reliability; 2]; 2],
-    pub(crate) wall_s: [Spread; 2],
+    pub(crate) wall_s: [QuantileSummary; 2],
     /// Chi2 per degree of freedom of the rig file on held-out records with nothing hidden and no wrong parameter: with a
     /// background it shows the size of that.
-    pub(crate) null_chi2: [Spread; 2],
+    pub(crate) null_chi2: [QuantileSummary; 2],
     /// Draws that took longer than the targets of the median and of the longest, in each world.
     pub(crate) longer: [[Rate; 2]; 2],
     pub(crate) errors: usize,
@@ -150,9 +150,10 @@ impl Worlds {
             null_chi2: [0, 1].map(|world: usize| {
                 let right =
                     worlds[world].iter().filter(|case| case.kind == Kind::Null && !case.wrong_parameters);
-                Spread::of(right.filter_map(|case| case.rig_file_chi2))
+                QuantileSummary::of(right.filter_map(|case| case.rig_file_chi2))
             }),
-            wall_s: [0, 1].map(|world: usize| Spread::of(worlds[world].iter().map(|case| case.wall_s))),
+            wall_s: [0, 1]
+                .map(|world: usize| QuantileSummary::of(worlds[world].iter().map(|case| case.wall_s))),
             longer,
             others: others.iter().map(|other| PairedCounts::of(score, other)).collect(),
             without_classes,
@@ -259,7 +260,7 @@ impl Worlds {
                     text,
                     "| {low:.1} to {high:.1} % | {} | {:.1} % | {:.1} % | {least:.1} to {most:.1} % |",
                     bin.explanations,
-                    100.0 * bin.said,
+                    100.0 * bin.stated,
                     100.0 * bin.right
                 );
             }
@@ -291,7 +292,7 @@ impl Worlds {
     }
 
     fn null_chi2_in_words(&self) -> String {
-        let of_world = |(world, spread): (&str, &Spread)| {
+        let of_world = |(world, spread): (&str, &QuantileSummary)| {
             let [least, median, _, largest] = spread.quantiles?;
             let of = spread.of;
             Some(format!("{world} {median:.2} in the median ({least:.2} to {largest:.2}, {of} draws)"))

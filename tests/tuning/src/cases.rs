@@ -19,9 +19,9 @@ pub struct Case {
     pub scene: Scene,
 }
 
-/// What a case is made of: names of the shipped files.
+/// Specification of a case: names of the shipped files.
 #[derive(Clone, Copy, Default)]
-pub struct Made<'a> {
+pub struct CaseSpec<'a> {
     pub experiment: &'a str,
     pub drive: Option<&'a str>,
     pub load: Option<&'a str>,
@@ -30,19 +30,19 @@ pub struct Made<'a> {
 }
 
 impl Case {
-    pub fn new(made: &Made) -> Result<Self, Box<dyn Error>> {
+    pub fn new(spec: &CaseSpec) -> Result<Self, Box<dyn Error>> {
         let room = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../controller");
         let program = |name: Option<&str>| Some(room.join(format!("programs/{}.toml", name?)));
         let files = FileArguments {
             rig: room.join("../plant/rig.toml"),
-            experiment: room.join(format!("experiments/{}.toml", made.experiment)),
-            drive_program: program(made.drive),
-            load_program: program(made.load),
-            set: made.set.to_vec(),
+            experiment: room.join(format!("experiments/{}.toml", spec.experiment)),
+            drive_program: program(spec.drive),
+            load_program: program(spec.load),
+            set: spec.set.to_vec(),
             ..FileArguments::default()
         };
         let inputs = Inputs::read(&files)?;
-        let scene = Scene::from_toml(&inputs.experiment_toml, made.experiment, &inputs.rig)?;
+        let scene = Scene::from_toml(&inputs.experiment_toml, spec.experiment, &inputs.rig)?;
         Ok(Self { inputs, scene })
     }
 

@@ -102,20 +102,20 @@ fn attempt_late(
 ) -> Result<Figures, TrialError> {
     let rig = trial.rig(&RigParameters::baseline())?;
     let setup = Setup { carriage_position_m: START_M, linked: false, added_mass_kg: trial.added_mass_kg };
-    let mut bench = Bench {
+    let mut drive = SimulatedDrive {
         plant: Plant::new(&rig, &setup)?,
         sensors: plant::Sensors::new(&rig, trial.seed),
         commands: VecDeque::from(vec![0.0; 1 + late_cycles]),
         cycle: 0,
     };
     let mut figures = Figures::default();
-    bench.follow(&mut program, SmoothTransition::new(START_M, START_M, 0.0), 0.5)?;
+    drive.follow(&mut program, SmoothTransition::new(START_M, START_M, 0.0), 0.5)?;
     let mut from_m = START_M;
     for part in moves {
         let way = SmoothTransition::new(from_m, part.to_m, part.duration_s);
-        let moving = bench.follow(&mut program, way, part.duration_s)?;
+        let moving = drive.follow(&mut program, way, part.duration_s)?;
         let resting =
-            bench.follow(&mut program, SmoothTransition::new(part.to_m, part.to_m, 0.0), part.rest_s)?;
+            drive.follow(&mut program, SmoothTransition::new(part.to_m, part.to_m, 0.0), part.rest_s)?;
         figures.take_move(&moving);
         figures.take_rest(&resting);
         if part.duration_s == 0.0 {
@@ -141,14 +141,14 @@ pub fn delay_margin(program: impl Fn() -> Program, trial: &Trial) -> Result<Opti
     Ok(Some(20))
 }
 
-struct Bench {
+struct SimulatedDrive {
     plant: Plant,
     sensors: plant::Sensors,
     commands: VecDeque<f64>,
     cycle: u64,
 }
 
-impl Bench {
+impl SimulatedDrive {
     /// Follows `way` for `duration_s`; errors of each cycle, m.
     fn follow(
         &mut self,

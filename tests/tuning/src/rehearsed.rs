@@ -40,7 +40,7 @@ pub struct Run {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Unrest {
+pub struct OscillationFigures {
     pub done: bool,
     /// Least peak to peak of the drive's position among the last three half seconds, m.
     pub position_m: f64,
@@ -50,7 +50,7 @@ pub struct Unrest {
     pub ripple_n: f64,
 }
 
-impl Unrest {
+impl OscillationFigures {
     pub fn is_still(&self) -> bool {
         self.done && self.position_m < STILL_M && self.force_n < STILL_N && self.ripple_n < RIPPLE_N
     }
@@ -94,7 +94,7 @@ pub fn worst_gain_margin(inputs: &Inputs, scene: &Scene) -> Result<f64, TrialErr
 /// Whether nothing oscillates with any kind of noise.
 fn is_still(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<bool, TrialError> {
     for seed in trial.seed..trial.seed + SEEDS {
-        if !rehearse(inputs, scene, &Trial { seed, ..*trial })?.unrest().is_still() {
+        if !rehearse(inputs, scene, &Trial { seed, ..*trial })?.oscillation().is_still() {
             return Ok(false);
         }
     }
@@ -102,7 +102,7 @@ fn is_still(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<bool, Trial
 }
 
 impl Run {
-    pub fn unrest(&self) -> Unrest {
+    pub fn oscillation(&self) -> OscillationFigures {
         let drive = |row: &RehearsalRow| row.axes[Axis::Drive.index()];
         let in_experiment =
             |row: &&RehearsalRow| drive(row).is_some_and(|drive| drive.main == MainChainState::Experiment);
@@ -120,13 +120,13 @@ impl Run {
         let rest_from = rows.len() - rows.iter().rev().take_while(|row| !moves(row)).count();
         let motion = &force[rest_from.saturating_sub(2 * WINDOW)..rest_from.saturating_sub(WINDOW)];
         let (quick, slow) = (means(motion, SMOOTH_N), means(motion, SLOW));
-        let beside =
+        let ripple =
             quick.iter().skip((SLOW - SMOOTH_N) / 2).zip(&slow).map(|(quick, slow)| (quick - slow).abs());
-        Unrest {
+        OscillationFigures {
             done: self.done,
             position_m: least(&position, SMOOTH_M),
             force_n: least(&force, SMOOTH_N),
-            ripple_n: beside.fold(0.0, f64::max),
+            ripple_n: ripple.fold(0.0, f64::max),
         }
     }
 }

@@ -6,29 +6,29 @@ use axis_control::program::file::Source;
 use plant::{Axis, RigParameters};
 use std::path::Path;
 use tuning::Trial;
-use tuning::cases::{Case, Made, figures};
+use tuning::cases::{Case, CaseSpec, figures};
 use tuning::position::{EXCITATION, attempt};
 
 /// Corners that margins are held in, kg and bar: nominal, light and weak, heavy and strong.
 const CORNERS: [(f64, f64); 3] = [(0.0, 7.0), (0.0, 5.0), (20.0, 8.0)];
 
-fn case(made: &Made) -> Case {
-    Case::new(made).unwrap()
+fn case(spec: &CaseSpec) -> Case {
+    Case::new(spec).unwrap()
 }
 
-fn rehearsed(made: &Made) -> impl Fn(&str) -> f64 + use<> {
-    let run = case(made).run(&Trial::default()).unwrap();
-    assert!(run.done, "{} came to no end", made.experiment);
+fn rehearsed(spec: &CaseSpec) -> impl Fn(&str) -> f64 + use<> {
+    let run = case(spec).run(&Trial::default()).unwrap();
+    assert!(run.done, "{} came to no end", spec.experiment);
     let figure = figures(&run);
     move |name| figure(name).unwrap_or_else(|| panic!("{name} is absent"))
 }
 
 fn positioning(drive: &str) -> impl Fn(&str) -> f64 + use<> {
-    rehearsed(&Made { experiment: "point-to-point", drive: Some(drive), ..Made::default() })
+    rehearsed(&CaseSpec { experiment: "point-to-point", drive: Some(drive), ..CaseSpec::default() })
 }
 
-fn load_step<'a>(load: &'a str, set: &'a [String]) -> Made<'a> {
-    Made { experiment: "load-step", load: Some(load), set, ..Made::default() }
+fn load_step<'a>(load: &'a str, set: &'a [String]) -> CaseSpec<'a> {
+    CaseSpec { experiment: "load-step", load: Some(load), set, ..CaseSpec::default() }
 }
 
 /// The paper's words for Fig. 9 that a run breaks.
@@ -71,7 +71,7 @@ fn fig_9_with_the_map() {
 #[test]
 fn fig_9_with_the_papers_two_laws_and_a_soft_drive() {
     let drive = Some("position-paper-linked");
-    let broken = broken_of_fig_9(rehearsed(&Made { drive, ..load_step("force-paper-linked", &[]) }));
+    let broken = broken_of_fig_9(rehearsed(&CaseSpec { drive, ..load_step("force-paper-linked", &[]) }));
     assert!(broken.is_empty(), "{broken:?}");
 }
 
@@ -87,8 +87,8 @@ fn twice_the_loop_leaves_the_map_still() {
     let case = case(&load_step("force-pid-map", &[]));
     for (added_mass_kg, supply_bar) in CORNERS {
         let trial = Trial { added_mass_kg, supply_bar, loop_factor: 2.0, ..Trial::default() };
-        let unrest = case.run(&trial).unwrap().unrest();
-        assert!(unrest.is_still(), "{trial:?}: {unrest:?}");
+        let oscillation = case.run(&trial).unwrap().oscillation();
+        assert!(oscillation.is_still(), "{trial:?}: {oscillation:?}");
     }
 }
 
@@ -112,6 +112,6 @@ fn wrong_gains_break_the_claims() {
     assert!(broken.contains(&"settles in 70 to 130 ms"), "{broken:?}");
     let trial = Trial { added_mass_kg: 20.0, supply_bar: 8.0, loop_factor: 2.0, ..Trial::default() };
     let loud = set("load.algorithm.gain_per_s=400");
-    let unrest = case(&load_step("force-pid-map", &loud)).run(&trial).unwrap().unrest();
-    assert!(!unrest.is_still(), "{unrest:?}");
+    let oscillation = case(&load_step("force-pid-map", &loud)).run(&trial).unwrap().oscillation();
+    assert!(!oscillation.is_still(), "{oscillation:?}");
 }

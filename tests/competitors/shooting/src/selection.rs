@@ -45,8 +45,8 @@ pub(crate) fn criterion<P: Problem>(problem: &P, fit: &P::Fit) -> f64 {
 }
 
 /// The best of some terms beside others, the criterion beside each.
-fn tried<P: Problem>(problem: &P, beside: &P::Fit) -> Vec<(f64, P::Fit)> {
-    let mut terms = problem.predicted_gains(beside);
+fn best_extensions<P: Problem>(problem: &P, base: &P::Fit) -> Vec<(f64, P::Fit)> {
+    let mut terms = problem.predicted_gains(base);
     let count = problem.count();
     let net_gain = |(term, gain): &(P::Term, f64)| gain - P::numbers(term) as f64 * count.ln();
     terms.sort_by(|one, other| net_gain(other).total_cmp(&net_gain(one)));
@@ -57,7 +57,7 @@ fn tried<P: Problem>(problem: &P, beside: &P::Fit) -> Vec<(f64, P::Fit)> {
         }
     }
     let fits = firsts.into_iter().filter_map(|term| {
-        let terms: Vec<P::Term> = P::terms(beside).iter().cloned().chain([term]).collect();
+        let terms: Vec<P::Term> = P::terms(base).iter().cloned().chain([term]).collect();
         problem.fit_roughly(&terms)
     });
     let mut fits: Vec<(f64, P::Fit)> = fits.map(|fit| (criterion(problem, &fit), fit)).collect();
@@ -85,10 +85,12 @@ pub(crate) fn select<P: Problem>(problem: &P, progress: &mut dyn FnMut(&P::Fit, 
     let mut alternatives: Vec<Vec<P::Term>> = Vec::new();
     progress(&best, least);
     while P::terms(&best).len() < MOST_TERMS {
-        let tried = tried(problem, &best);
-        let as_good = tried.iter().skip(1).take_while(|(next, _)| tried[0].0 + AS_GOOD > *next);
+        let extensions = best_extensions(problem, &best);
+        let as_good = extensions.iter().skip(1).take_while(|(next, _)| extensions[0].0 + AS_GOOD > *next);
         let others = as_good.filter_map(|(_, fit)| P::terms(fit).last().cloned()).collect();
-        let Some((next, fit)) = tried.into_iter().next().filter(|(next, _)| *next < least) else { break };
+        let Some((next, fit)) = extensions.into_iter().next().filter(|(next, _)| *next < least) else {
+            break;
+        };
         (least, best) = (next, fit);
         alternatives.push(others);
         // What came last is not asked: it was just taken.

@@ -193,37 +193,39 @@ impl System<'_> {
         let mut drawn = 0.0;
         for axis in 0..2 {
             let n = &self.numbers.axes[axis];
-            let own = &y[AXIS * axis..AXIS * (axis + 1)];
+            let axis_state = &y[AXIS * axis..AXIS * (axis + 1)];
             let out = &mut rate[AXIS * axis..AXIS * (axis + 1)];
-            let (x, v) = (own[X], own[V]);
+            let (x, v) = (axis_state[X], axis_state[V]);
             out[X] = v;
             out[V] = self.acceleration(axis, y);
-            let error = self.target[axis] - own[SPOOL];
+            let error = self.target[axis] - axis_state[SPOOL];
             (out[SPOOL], out[SPOOL_RATE]) = match n.second_order {
-                Some([w, z]) => (own[SPOOL_RATE], w * w * error - 2.0 * z * w * own[SPOOL_RATE]),
+                Some([w, z]) => {
+                    (axis_state[SPOOL_RATE], w * w * error - 2.0 * z * w * axis_state[SPOOL_RATE])
+                }
                 None => (error / TAU_VALVE, 0.0),
             };
-            let ports = [0, 1].map(|chamber| self.port(axis, chamber, own, y[P_NODE]));
+            let ports = [0, 1].map(|chamber| self.port(axis, chamber, axis_state, y[P_NODE]));
             drawn += ports[0][1] + ports[1][1];
             out[P_SILENCER] = n.silencer.map_or(0.0, |[ratio, volume]| {
-                let leaves = orifice(ratio * KV_EXHAUST[5], 0.5, own[P_SILENCER], P_EXHAUST);
+                let leaves = orifice(ratio * KV_EXHAUST[5], 0.5, axis_state[P_SILENCER], P_EXHAUST);
                 P_NORMAL / volume * (-ports[0][2] - ports[1][2] - leaves)
             });
-            let across = n.leak[0] * (own[P[0]].powi(2) - own[P[1]].powi(2));
+            let across = n.leak[0] * (axis_state[P[0]].powi(2) - axis_state[P[1]].powi(2));
             for chamber in 0..2 {
-                let p = own[P[chamber]];
+                let p = axis_state[P[chamber]];
                 let out_of_seal = n.leak[1 + chamber] * (p * p - P_ATMOSPHERE * P_ATMOSPHERE);
-                let net = own[Q[chamber]] + [-across, across][chamber] - out_of_seal;
+                let net = axis_state[Q[chamber]] + [-across, across][chamber] - out_of_seal;
                 let volume = self.volume(axis, chamber, x);
                 let swept = [1.0, -1.0][chamber] * AREA[chamber] * v;
                 let mass_flow = P_NORMAL * net / (GAS * T_WALL);
-                out[Q[chamber]] = (ports[chamber][0] - own[Q[chamber]]) / TAU_FLOW;
+                out[Q[chamber]] = (ports[chamber][0] - axis_state[Q[chamber]]) / TAU_FLOW;
                 out[GAS_MASS[chamber]] = mass_flow;
                 out[P[chamber]] = match n.heat {
                     None => (P_NORMAL * net - p * swept) / volume,
                     Some(h) => {
                         // Energy: c_v d(m T)/dt, with m T = p V / R.
-                        let temperature = p * volume / (own[GAS_MASS[chamber]] * GAS);
+                        let temperature = p * volume / (axis_state[GAS_MASS[chamber]] * GAS);
                         let carried = if net > 0.0 { T_WALL } else { temperature };
                         let area = AREA[chamber];
                         let wall = 2.0 * area + 2.0 * (std::f64::consts::PI / area).sqrt() * volume;
@@ -232,10 +234,10 @@ impl System<'_> {
                     }
                 };
             }
-            out[BRISTLE] = self.bristles(axis, own)[1];
-            let truths = [[x, STROKE - x][axis], own[P[0]], own[P[1]]];
+            out[BRISTLE] = self.bristles(axis, axis_state)[1];
+            let truths = [[x, STROKE - x][axis], axis_state[P[0]], axis_state[P[1]]];
             for (i, lag) in [n.lag[0], n.lag[2], n.lag[3]].into_iter().enumerate() {
-                out[SHOWN[i]] = if lag > 0.0 { (truths[i] - own[SHOWN[i]]) / lag } else { 0.0 };
+                out[SHOWN[i]] = if lag > 0.0 { (truths[i] - axis_state[SHOWN[i]]) / lag } else { 0.0 };
             }
         }
         rate[P_NODE] = self.numbers.droop.map_or(0.0, |[droop, volume]| {

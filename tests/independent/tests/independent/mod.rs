@@ -15,7 +15,7 @@ use numbers::Numbers;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Excitation, Sheet};
 use plant::{Inputs, Plant, RigParameters, Setup, State};
-use solution::{Seen, solve};
+use solution::{AxisSample, solve};
 
 /// Noise of the sensors, rms: position, force, pressures [rig-model.md, Sensors].
 pub(crate) const NOISE: [f64; 4] = [20e-6, 0.5, 400.0, 400.0];
@@ -194,7 +194,7 @@ pub(crate) struct Window {
     rig: RigParameters,
     start: State,
     inputs: Vec<Inputs>,
-    solved: Vec<[Seen; 2]>,
+    solved: Vec<[AxisSample; 2]>,
 }
 
 impl Window {
@@ -204,9 +204,9 @@ impl Window {
         let inputs: Vec<Inputs> = (0..motion.ms).map(|k| motion.inputs(k, true)).collect();
         let solved = solve(&numbers, &start, &inputs);
         let directions = start.axes.map(|axis| axis.rod_velocity_m_per_s.signum());
-        for (k, seen) in solved.iter().enumerate() {
+        for (k, samples) in solved.iter().enumerate() {
             for axis in 0..2 {
-                let speed = seen[axis].velocity * directions[axis];
+                let speed = samples[axis].velocity * directions[axis];
                 assert!(speed > 1e-3, "{}: axis {axis} comes to rest at {k} ms: {speed}", motion.name);
             }
         }
@@ -239,8 +239,13 @@ impl Window {
                     let at = names.iter().position(|column| *column == format!("{part}_{name}"));
                     at.map_or(0.0, |i| terms.values()[i])
                 };
-                let (own, want) = (&truth.axes[axis], &solved[axis]);
-                let got = [own.position_m, own.sensor_force_n, own.pressure_a_pa, own.pressure_b_pa];
+                let (plant_axis, want) = (&truth.axes[axis], &solved[axis]);
+                let got = [
+                    plant_axis.position_m,
+                    plant_axis.sensor_force_n,
+                    plant_axis.pressure_a_pa,
+                    plant_axis.pressure_b_pa,
+                ];
                 let mut add = |i: usize, difference: f64| squares[axis][i] += difference * difference;
                 for channel in 0..4 {
                     add(channel, (got[channel] - want.truth[channel]) / NOISE[channel]);
@@ -248,8 +253,8 @@ impl Window {
                     let error = if counts { shown[axis][channel] - want.shown[channel] } else { 0.0 };
                     add(4 + channel, error / NOISE[channel]);
                 }
-                add(8, (own.rod_velocity_m_per_s - want.velocity) * 1e3);
-                add(9, own.spool - want.spool);
+                add(8, (plant_axis.rod_velocity_m_per_s - want.velocity) * 1e3);
+                add(9, plant_axis.spool - want.spool);
                 let silencer = numbers::P_EXHAUST + term("exhaust_side_silencer_back_pressure_Pa");
                 add(10, (silencer - want.silencer) / NOISE[2]);
                 add(11, (truth.supply_pressure_pa - want.node) / NOISE[2]);

@@ -16,9 +16,9 @@ const RELATIVE: f64 = 1e-9;
 const ABSOLUTE: [f64; AXIS] =
     [1e-11, 1e-9, 1e-10, 1e-7, 1e-3, 1e-3, 1e-13, 1e-13, 1e-12, 1e-12, 1e-3, 1e-13, 1e-11, 1e-3, 1e-3];
 
-/// What is compared, of one axis at one instant.
+/// The compared quantities of one axis at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct AxisSample {
     pub(crate) velocity: f64,
     pub(crate) spool: f64,
     /// Position, force, pressure a, pressure b.
@@ -34,26 +34,26 @@ pub(crate) struct Seen {
 type Y = [f64; STATES];
 
 /// What the sensors would show at each millisecond of a window, for both axes.
-pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<[Seen; 2]> {
+pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<[AxisSample; 2]> {
     let mut system =
         System { numbers, target: [0.0; 2], linked: start.linked, added_mass: start.added_mass_kg };
     let end = inputs.len() as f64 * 1e-3;
     let mut edges: Vec<f64> = vec![0.0, end];
-    let mut asked: Vec<f64> = Vec::new();
+    let mut requested: Vec<f64> = Vec::new();
     for k in 0..=inputs.len() {
         let t = k as f64 * 1e-3;
         edges.extend(numbers.axes.iter().map(|axis| t + axis.dead_time));
         let skews = numbers.axes.iter().flat_map(|axis| axis.skew);
-        asked.extend(skews.map(|skew| t - skew).filter(|&t| t >= 0.0));
-        asked.push(t);
+        requested.extend(skews.map(|skew| t - skew).filter(|&t| t >= 0.0));
+        requested.push(t);
     }
-    for times in [&mut edges, &mut asked] {
+    for times in [&mut edges, &mut requested] {
         times.retain(|&t| (0.0..=end).contains(&t));
         times.sort_by(f64::total_cmp);
         times.dedup_by(|b, a| *b - *a < 1e-12);
     }
 
-    let mut y = first(&system, start);
+    let mut y = initial_state(&system, start);
     let mut solved: Vec<(f64, Y)> = vec![(0.0, y)];
     let mut play = start.axes.map(|axis| axis.spool);
     for leg in edges.windows(2) {
@@ -71,9 +71,9 @@ pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<
             system.target[axis] = play[axis].clamp(-1.0, 1.0);
         }
         let inside = |t: f64| t > leg[0] + 1e-12 && t < leg[1] - 1e-12;
-        let mut times: Vec<f64> = asked.iter().copied().filter(|&t| inside(t)).collect();
+        let mut times: Vec<f64> = requested.iter().copied().filter(|&t| inside(t)).collect();
         times.push(leg[1]);
-        for (t, state) in times.iter().zip(through(&system, &y, leg[0], &times)) {
+        for (t, state) in times.iter().zip(states_at(&system, &y, leg[0], &times)) {
             solved.push((*t, state));
             y = state;
         }
@@ -82,7 +82,7 @@ pub(crate) fn solve(numbers: &Numbers, start: &State, inputs: &[Inputs]) -> Vec<
         let near = |(s, _): &&(f64, Y)| (s - t).abs() < 1e-9;
         &solved.iter().find(near).expect("this time was asked for").1
     };
-    (1..=inputs.len()).map(|k| [0, 1].map(|axis| seen(&system, axis, k as f64 * 1e-3, at))).collect()
+    (1..=inputs.len()).map(|k| [0, 1].map(|axis| sample(&system, axis, k as f64 * 1e-3, at))).collect()
 }
 
 /// The equations in units of the absolute tolerances, since the solver takes one tolerance for all states.
@@ -101,7 +101,7 @@ impl ode_solvers::System<f64, DVector<f64>> for Scaled<'_> {
 }
 
 /// The states at these times, of which the last ends the leg.
-fn through(system: &System<'_>, from: &Y, begin: f64, times: &[f64]) -> Vec<Y> {
+fn states_at(system: &System<'_>, from: &Y, begin: f64, times: &[f64]) -> Vec<Y> {
     let units: Y = std::array::from_fn(|i| if i == P_NODE { 1e-3 } else { ABSOLUTE[i % AXIS] });
     let (mut t, mut y) = (begin, *from);
     let step_to = |&end: &f64| {
@@ -135,23 +135,23 @@ fn through(system: &System<'_>, from: &Y, begin: f64, times: &[f64]) -> Vec<Y> {
 }
 
 /// The start of a window, with all that effects remember at rest, as the plant has it.
-fn first(system: &System<'_>, start: &State) -> Y {
+fn initial_state(system: &System<'_>, start: &State) -> Y {
     let mut y = [0.0; STATES];
-    for (axis, own) in start.axes.iter().enumerate() {
+    for (axis, axis_state) in start.axes.iter().enumerate() {
         let row = &mut y[AXIS * axis..AXIS * (axis + 1)];
-        row[X] = own.extension_m;
-        row[V] = own.rod_velocity_m_per_s;
-        row[SPOOL] = own.spool;
+        row[X] = axis_state.extension_m;
+        row[V] = axis_state.rod_velocity_m_per_s;
+        row[SPOOL] = axis_state.spool;
         row[P_SILENCER] = P_EXHAUST;
         row[BRISTLE] = 0.0;
-        let stored = [own.stored_air_a_j, own.stored_air_b_j];
-        let flow = [own.flow_a_m3_per_s, own.flow_b_m3_per_s];
+        let stored = [axis_state.stored_air_a_j, axis_state.stored_air_b_j];
+        let flow = [axis_state.flow_a_m3_per_s, axis_state.flow_b_m3_per_s];
         for chamber in 0..2 {
-            row[P[chamber]] = stored[chamber] / system.volume(axis, chamber, own.extension_m);
+            row[P[chamber]] = stored[chamber] / system.volume(axis, chamber, axis_state.extension_m);
             row[GAS_MASS[chamber]] = stored[chamber] / (GAS * T_WALL);
             row[Q[chamber]] = flow[chamber];
         }
-        let position = [own.extension_m, STROKE - own.extension_m][axis];
+        let position = [axis_state.extension_m, STROKE - axis_state.extension_m][axis];
         (row[SHOWN[0]], row[SHOWN[1]], row[SHOWN[2]]) = (position, row[P[0]], row[P[1]]);
     }
     y[P_NODE] = start.supply_pressure_pa;
@@ -160,30 +160,30 @@ fn first(system: &System<'_>, start: &State) -> Y {
 
 /// Position, force, pressures of an axis by rig-model.md.
 fn truths(system: &System<'_>, axis: usize, y: &Y) -> [f64; 4] {
-    let own = &y[AXIS * axis..AXIS * (axis + 1)];
+    let axis_state = &y[AXIS * axis..AXIS * (axis + 1)];
     let contact = system.contact(y);
     let behind = CARRIAGE + system.added_mass;
     let force = [behind * system.acceleration(0, y) - contact, -contact][axis];
-    [[own[X], STROKE - own[X]][axis], force, own[P[0]], own[P[1]]]
+    [[axis_state[X], STROKE - axis_state[X]][axis], force, axis_state[P[0]], axis_state[P[1]]]
 }
 
-fn seen<'y>(system: &System<'_>, axis: usize, t: f64, at: impl Fn(f64) -> &'y Y) -> Seen {
+fn sample<'y>(system: &System<'_>, axis: usize, t: f64, at: impl Fn(f64) -> &'y Y) -> AxisSample {
     let (y, n) = (at(t), &system.numbers.axes[axis]);
-    let own = &y[AXIS * axis..AXIS * (axis + 1)];
+    let axis_state = &y[AXIS * axis..AXIS * (axis + 1)];
     let truth = truths(system, axis, y);
-    let lagged = [own[SHOWN[0]], truth[1], own[SHOWN[1]], own[SHOWN[2]]];
+    let lagged = [axis_state[SHOWN[0]], truth[1], axis_state[SHOWN[1]], axis_state[SHOWN[2]]];
     let shown = [0, 1, 2, 3].map(|i: usize| {
         let lag = if n.lag[i] > 0.0 { lagged[i] - truth[i] } else { 0.0 };
         let old = truths(system, axis, at((t - n.skew[i]).max(0.0)))[i];
         truth[i] + lag + n.gain[i] * truth[i] + n.offset[i] + (old - truth[i])
     });
-    Seen {
-        velocity: own[V],
-        spool: own[SPOOL],
+    AxisSample {
+        velocity: axis_state[V],
+        spool: axis_state[SPOOL],
         truth,
         shown,
-        silencer: own[P_SILENCER],
-        bristles: -system.bristles(axis, own)[0],
+        silencer: axis_state[P_SILENCER],
+        bristles: -system.bristles(axis, axis_state)[0],
         node: y[P_NODE],
     }
 }

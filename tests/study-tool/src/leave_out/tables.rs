@@ -3,7 +3,7 @@
 use super::LeaveOutJudgement;
 use crate::interval::Rate;
 use crate::score::Case;
-use crate::score::tables::{Line, Spread, hidden, parts};
+use crate::score::tables::{Line, QuantileSummary, hidden, parts};
 use plant::effects::SHEETS;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -27,9 +27,9 @@ pub(crate) struct Split {
     pub(crate) variable_right: Rate,
     pub(crate) both_right: Rate,
     /// Share of the gap that the program claims to have closed, of the worst signal.
-    pub(crate) claimed_closed_ratio: Spread,
+    pub(crate) claimed_closed_ratio: QuantileSummary,
     /// The same for all signals together, each in units of its noise.
-    pub(crate) claimed_joint_ratio: Spread,
+    pub(crate) claimed_joint_ratio: QuantileSummary,
     pub(crate) verdicts: BTreeMap<&'static str, usize>,
 }
 
@@ -63,8 +63,8 @@ fn split(name: &str, cases: &[(&Case, &LeaveOutJudgement)]) -> Split {
         balance_right: rate(&|left| left.balance_right),
         variable_right: rate(&|left| left.variable_right),
         both_right: rate(&|left| left.balance_right && left.variable_right),
-        claimed_closed_ratio: Spread::of(claims().filter_map(|claim| claim.claimed_closed_ratio)),
-        claimed_joint_ratio: Spread::of(claims().filter_map(|claim| claim.claimed_joint_ratio)),
+        claimed_closed_ratio: QuantileSummary::of(claims().filter_map(|claim| claim.claimed_closed_ratio)),
+        claimed_joint_ratio: QuantileSummary::of(claims().filter_map(|claim| claim.claimed_joint_ratio)),
         verdicts,
     }
 }

@@ -3,7 +3,7 @@
 use super::{percent, reported, table};
 use crate::compare::verdicts;
 use crate::leave_out::tables::{Split, Tables};
-use crate::score::tables::Spread;
+use crate::score::tables::QuantileSummary;
 use crate::score::{Case, Score};
 use pagekit::page::escaped;
 
@@ -38,7 +38,7 @@ fn splits(head: &str, splits: &[Split]) -> String {
     table(&heads, splits.iter().map(row))
 }
 
-fn median(spread: &Spread) -> String {
+fn median(spread: &QuantileSummary) -> String {
     spread.quantiles.map_or("<span class=\"none\">none</span>".to_owned(), |all| {
         format!("{} % <span class=\"soft\">of {}</span>", percent(all[1]), spread.of)
     })

@@ -121,14 +121,14 @@ set-point = [{ law = "rest", duration_s = 0.3 }]
 "#;
 
 /// A study whose program leaves `inclination` and its twin ambiguous, until the second record names the effect.
-struct Bench {
+struct StudyFixture {
     folder: TempDir,
     study: Study,
     draw: Draw,
     stop: AtomicBool,
 }
 
-impl Bench {
+impl StudyFixture {
     fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let shape = Shape { each: 1, ..Shape::NO_DRAW };
@@ -142,7 +142,7 @@ impl Bench {
             let text = "time_s,drive_valve,drive_position_m\n0.000,0,0.1\n";
             fs::write(record.join("measurement.csv"), text).unwrap();
         }
-        Bench { folder, study, draw, stop: AtomicBool::new(false) }
+        StudyFixture { folder, study, draw, stop: AtomicBool::new(false) }
     }
 
     fn program(&self, resolved: &str, proposes: &str) -> Program {
@@ -184,9 +184,9 @@ const PROPOSES: &str = r#""next": {"reason": "alike", "experiment": "next-short.
 
 #[test]
 fn what_was_ambiguous_is_measured_again_and_judged_with_both_records() {
-    let bench = Bench::new();
-    let program = bench.program("TRUTH", PROPOSES);
-    let table = bench.run("right", &program);
+    let fixture = StudyFixture::new();
+    let program = fixture.program("TRUTH", PROPOSES);
+    let table = fixture.run("right", &program);
     assert_eq!((table.singles, table.open, table.truth_not_among, table.cases.len()), (1, 1, 0, 1));
     assert_eq!(table.cases[0].outcome, Some(Outcome::Resolved), "{:?}", table.cases[0].problem);
     let class = &table.classes[0];
@@ -195,41 +195,41 @@ fn what_was_ambiguous_is_measured_again_and_judged_with_both_records() {
     assert!(
         table.markdown().contains("| friction-asymmetry, inclination | 1 | 0 |  | next-short.toml (1) | 1/1")
     );
-    let folder = bench.study.run("right-resolve", bench.draw.number);
+    let folder = fixture.study.run("right-resolve", fixture.draw.number);
     assert_eq!(fs::read_to_string(folder.join("next.toml")).unwrap(), SHORT);
 
     // Done is done; a run that did not keep the experiment is repeated for it.
     fs::write(folder.join("mark"), "").unwrap();
-    run(&bench.step("right", false), &program, &bench.draw).unwrap();
+    run(&fixture.step("right", false), &program, &fixture.draw).unwrap();
     assert!(folder.join("mark").exists());
-    fs::remove_file(bench.study.run("right", bench.draw.number).join("next-short.toml")).unwrap();
-    run(&bench.step("right", true), &program, &bench.draw).unwrap();
+    fs::remove_file(fixture.study.run("right", fixture.draw.number).join("next-short.toml")).unwrap();
+    run(&fixture.step("right", true), &program, &fixture.draw).unwrap();
     assert!(!folder.join("mark").exists());
-    assert_eq!(Table::of(&bench.study, "right").unwrap().classes[0].resolved.count, 1);
+    assert_eq!(Table::of(&fixture.study, "right").unwrap().classes[0].resolved.count, 1);
 
     // Another program does not go on with the results of this one.
-    let other = bench.program("TWIN", PROPOSES);
-    let error = run(&bench.step("right", false), &other, &bench.draw).unwrap_err().to_string();
+    let other = fixture.program("TWIN", PROPOSES);
+    let error = run(&fixture.step("right", false), &other, &fixture.draw).unwrap_err().to_string();
     assert!(error.contains("another program"), "{error}");
-    let table = bench.run("wrong", &other);
+    let table = fixture.run("wrong", &other);
     assert_eq!((table.all.wrong, table.all.resolved.count, table.all.resolved.of), (1, 0, 1));
 }
 
 #[test]
 fn where_no_experiment_can_tell_nothing_is_run_and_what_would_is_counted() {
-    let bench = Bench::new();
-    let program = bench.program("TRUTH", r#""next": {"experiment": null, "otherwise": "tilting"}"#);
-    let class = bench.run("none", &program).classes.remove(0);
+    let fixture = StudyFixture::new();
+    let program = fixture.program("TRUTH", r#""next": {"experiment": null, "otherwise": "tilting"}"#);
+    let class = fixture.run("none", &program).classes.remove(0);
     assert_eq!((class.no_experiment, class.resolved.of, class.not_run), (1, 0, 0));
     assert_eq!(class.otherwise.into_iter().collect::<Vec<_>>(), [("tilting".to_owned(), 1)]);
-    assert!(!bench.study.run("none-resolve", bench.draw.number).exists());
+    assert!(!fixture.study.run("none-resolve", fixture.draw.number).exists());
 }
 
 #[test]
 fn an_experiment_that_is_not_proposed_again_is_an_error_that_says_so() {
-    let bench = Bench::new();
+    let fixture = StudyFixture::new();
     let lost = PROPOSES.replace("next-short", "next-other");
-    let table = bench.run("lost", &bench.program("TRUTH", &lost));
+    let table = fixture.run("lost", &fixture.program("TRUTH", &lost));
     assert_eq!(table.cases[0].outcome, Some(Outcome::Error));
     assert!(table.cases[0].problem.as_ref().unwrap().contains("did not write next-other.toml"));
     assert_eq!(table.all.errors, 1);

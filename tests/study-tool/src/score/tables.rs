@@ -25,13 +25,13 @@ pub struct Tables {
     /// Verdicts in cases with nothing hidden, and in those of a wrong parameter.
     pub(crate) nothing_hidden: Vec<ConfusionRow>,
     pub(crate) numbers: Numbers,
-    pub(crate) wall_s: Spread,
-    pub(crate) memory_mib: Spread,
+    pub(crate) wall_s: QuantileSummary,
+    pub(crate) memory_mib: QuantileSummary,
     /// Share of the gap that the program claims to have closed on the held-out record, for single effects that were named
     /// right.
-    pub(crate) claimed_closed_ratio: Spread,
+    pub(crate) claimed_closed_ratio: QuantileSummary,
     /// The same for all signals together, each in units of its noise.
-    pub(crate) claimed_joint_ratio: Spread,
+    pub(crate) claimed_joint_ratio: QuantileSummary,
     /// Reasons why cases have no good report, and how many.
     pub(crate) errors: BTreeMap<String, usize>,
 }
@@ -88,9 +88,9 @@ pub(crate) struct ConfusionRow {
 #[derive(Debug, Clone, Serialize)]
 pub(crate) struct Numbers {
     /// |fitted - true| / |true| of amplitudes, in the catalogue's form.
-    pub(crate) off_ratio: Spread,
+    pub(crate) off_ratio: QuantileSummary,
     /// Standard error / |true| of amplitudes.
-    pub(crate) error_ratio: Spread,
+    pub(crate) error_ratio: QuantileSummary,
     /// Share of amplitudes within two standard errors.
     pub(crate) covered: Rate,
     /// Share of all numbers within two standard errors.
@@ -102,18 +102,20 @@ pub(crate) struct Numbers {
 }
 
 #[derive(Debug, Clone, Copy, Default, Serialize)]
-pub(crate) struct Spread {
+pub(crate) struct QuantileSummary {
     pub(crate) of: usize,
     /// Smallest, median, 90th percentile, largest; `None` without values.
     pub(crate) quantiles: Option<[f64; 4]>,
 }
 
-impl Spread {
+impl QuantileSummary {
     pub(crate) fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut values: Vec<f64> = values.into_iter().collect();
         let all = [0.0, 0.5, 0.9, 1.0].map(|share| quantile(&mut values, share));
-        let [Some(least), Some(median), Some(high), Some(largest)] = all else { return Spread::default() };
-        Spread { of: values.len(), quantiles: Some([least, median, high, largest]) }
+        let [Some(least), Some(median), Some(high), Some(largest)] = all else {
+            return QuantileSummary::default();
+        };
+        QuantileSummary { of: values.len(), quantiles: Some([least, median, high, largest]) }
     }
 }
 
@@ -134,10 +136,14 @@ impl Tables {
             confusion: SHEETS.iter().map(|sheet| row(sheet.name, of_sheet(sheet.name))).collect(),
             nothing_hidden: nothing_hidden(cases),
             numbers: numbers(&singles),
-            wall_s: Spread::of(cases.iter().map(|case| case.wall_s)),
-            memory_mib: Spread::of(cases.iter().map(|case| case.memory_kib as f64 / 1024.0)),
-            claimed_closed_ratio: Spread::of(judged_right().filter_map(|own| own.claimed_closed_ratio)),
-            claimed_joint_ratio: Spread::of(judged_right().filter_map(|own| own.claimed_joint_ratio)),
+            wall_s: QuantileSummary::of(cases.iter().map(|case| case.wall_s)),
+            memory_mib: QuantileSummary::of(cases.iter().map(|case| case.memory_kib as f64 / 1024.0)),
+            claimed_closed_ratio: QuantileSummary::of(
+                judged_right().filter_map(|own| own.claimed_closed_ratio),
+            ),
+            claimed_joint_ratio: QuantileSummary::of(
+                judged_right().filter_map(|own| own.claimed_joint_ratio),
+            ),
             errors,
         }
     }
@@ -288,8 +294,8 @@ fn numbers(singles: &[&Case]) -> Numbers {
         Rate::of(numbers.filter_map(|number| number.covered), |covered| covered)
     };
     Numbers {
-        off_ratio: Spread::of(amplitudes().map(|number| number.off_ratio)),
-        error_ratio: Spread::of(amplitudes().filter_map(|number| number.error_ratio)),
+        off_ratio: QuantileSummary::of(amplitudes().map(|number| number.off_ratio)),
+        error_ratio: QuantileSummary::of(amplitudes().filter_map(|number| number.error_ratio)),
         covered: covered(&mut amplitudes()),
         all_covered: covered(&mut reported(false)),
         foreign_covered: covered(&mut reported(true)),

@@ -15,7 +15,7 @@ use tempfile::TempDir;
 const SHAPE: Shape = Shape { nulls: 2, pairs: 1, ..Shape::NO_DRAW };
 const HEAD: &str = "# linked=false added_mass_kg=0\ntime_s,drive_valve,drive_position_m\n";
 
-struct Bench {
+struct StudyFixture {
     folder: TempDir,
     study: Study,
     program: Program,
@@ -26,12 +26,12 @@ struct Bench {
     tripped: Option<u64>,
 }
 
-impl Bench {
+impl StudyFixture {
     fn new(script: &str) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let study = Study::begin(&folder.path().join("study"), &Plan::new(5, SHAPE)).unwrap();
         let program = program(&folder, script);
-        Bench {
+        StudyFixture {
             folder,
             study,
             program,
@@ -81,48 +81,49 @@ mkdir out && echo '{"verdict": "nothing-missing"}' >out/report.json"#;
 #[test]
 fn a_program_sees_copies_in_an_empty_folder_and_its_report_is_kept() {
     // $9 is the folder: after the shift only what the study adds is left.
-    let bench = Bench::new(
+    let fixture = StudyFixture::new(
         &ANSWERS.replace("shift 9; [ \"$1\" = \"\" ] && exit 8", "shift 9; [ \"$1\" = --more ] || exit 8"),
     );
-    let results = bench.run(|_, _| {}).unwrap();
-    for draw in &bench.study.draws {
-        let result = read_result(&bench.path(draw.number, "result.json")).unwrap();
+    let results = fixture.run(|_, _| {}).unwrap();
+    for draw in &fixture.study.draws {
+        let result = read_result(&fixture.path(draw.number, "result.json")).unwrap();
         assert_eq!(results[draw.number].as_ref(), Some(&result));
-        let reported = fs::read_to_string(bench.path(draw.number, "stderr.txt")).unwrap();
+        let reported = fs::read_to_string(fixture.path(draw.number, "stderr.txt")).unwrap();
         assert_eq!((result.number, result.taken.ended), (draw.number, ProgramEnd::Exited(0)), "{reported}");
         assert_eq!(reported, "seen: # linked=false added_mass_kg=0\n");
-        assert!(report::read(&bench.path(draw.number, "report.json")).is_ok());
-        assert!(!bench.study.truth(draw.number).join("train/truth.csv").exists());
-        assert!(bench.study.truth(draw.number).join("held-out-1/truth.json").exists());
+        assert!(report::read(&fixture.path(draw.number, "report.json")).is_ok());
+        assert!(!fixture.study.truth(draw.number).join("train/truth.csv").exists());
+        assert!(fixture.study.truth(draw.number).join("held-out-1/truth.json").exists());
     }
     // Three records for each draw, made once, however often it runs again.
-    assert_eq!(bench.run(|_, _| {}).unwrap(), results);
-    assert_eq!(bench.made.load(Ordering::Relaxed), 9);
+    assert_eq!(fixture.run(|_, _| {}).unwrap(), results);
+    assert_eq!(fixture.made.load(Ordering::Relaxed), 9);
 }
 
 #[test]
 fn a_study_that_was_killed_goes_on_where_it_was() {
-    let bench = Bench::new("sleep 1000");
+    let fixture = StudyFixture::new("sleep 1000");
     // Told to stop while the program runs: it is killed, and its draw is not done.
     let ended = std::thread::scope(|scope| {
-        let running = scope.spawn(|| bench.run(|_, _| {}));
-        while !bench.folder.path().join("study/runs/fake").exists() {
+        let running = scope.spawn(|| fixture.run(|_, _| {}));
+        while !fixture.folder.path().join("study/runs/fake").exists() {
             std::thread::sleep(Duration::from_millis(5));
         }
-        bench.stop.store(true, Ordering::Relaxed);
+        fixture.stop.store(true, Ordering::Relaxed);
         running.join().unwrap()
     });
     assert_eq!(ended.unwrap(), [None, None, None]);
-    assert!(bench.study.draws.iter().all(|draw| !bench.study.run("fake", draw.number).exists()));
+    assert!(fixture.study.draws.iter().all(|draw| !fixture.study.run("fake", draw.number).exists()));
 
     // What a kill leaves behind: half a folder of a run and of records.
     for half in ["runs/fake/.0000.unfinished", "records/.0001.unfinished"] {
-        fs::create_dir_all(bench.study.root.join(half)).unwrap();
-        fs::write(bench.study.root.join(half).join("half"), "{").unwrap();
+        fs::create_dir_all(fixture.study.root.join(half)).unwrap();
+        fs::write(fixture.study.root.join(half).join("half"), "{").unwrap();
     }
-    let bench = Bench { program: program(&bench.folder, "exit 0"), stop: AtomicBool::new(false), ..bench };
-    assert!(bench.run(|_, _| {}).unwrap().iter().all(Option::is_some));
-    assert!(!bench.path(0, "half").exists());
+    let fixture =
+        StudyFixture { program: program(&fixture.folder, "exit 0"), stop: AtomicBool::new(false), ..fixture };
+    assert!(fixture.run(|_, _| {}).unwrap().iter().all(Option::is_some));
+    assert!(!fixture.path(0, "half").exists());
 }
 
 #[test]
@@ -135,77 +136,80 @@ fn a_program_that_crashes_hangs_or_writes_nonsense_is_a_result() {
         (nonsense, ProgramEnd::Exited(0)),
         ("mkdir -p out/report.json", ProgramEnd::Exited(0)),
     ] {
-        let mut bench = Bench::new(script);
-        bench.program.limit = Duration::from_millis(if ended == ProgramEnd::TimedOut { 100 } else { 60_000 });
-        let results = bench.run(|_, _| {}).unwrap();
+        let mut fixture = StudyFixture::new(script);
+        fixture.program.limit =
+            Duration::from_millis(if ended == ProgramEnd::TimedOut { 100 } else { 60_000 });
+        let results = fixture.run(|_, _| {}).unwrap();
         let result = results[0].as_ref().unwrap();
         assert_eq!(result.taken.ended, ended, "{script}");
-        assert!(report::read(&bench.path(0, "report.json")).is_err(), "{script}");
+        assert!(report::read(&fixture.path(0, "report.json")).is_err(), "{script}");
     }
 }
 
 #[test]
 fn a_column_that_could_tell_is_refused() {
-    let bench = Bench { head: "time_s,drive_valve,drive_leakage\n", ..Bench::new("exit 0") };
-    let error = bench.run(|_, _| {}).unwrap_err().to_string();
+    let fixture = StudyFixture { head: "time_s,drive_valve,drive_leakage\n", ..StudyFixture::new("exit 0") };
+    let error = fixture.run(|_, _| {}).unwrap_err().to_string();
     assert!(error.contains("drive_leakage"), "{error}");
 }
 
 #[test]
 fn a_record_that_cannot_be_made_is_told_and_leaves_nothing() {
-    let mut bench = Bench::new("exit 0");
-    bench.tripped = Some(bench.study.draws[0].recipe.seed);
-    let error = bench.run(|_, _| {}).unwrap_err().to_string();
+    let mut fixture = StudyFixture::new("exit 0");
+    fixture.tripped = Some(fixture.study.draws[0].recipe.seed);
+    let error = fixture.run(|_, _| {}).unwrap_err().to_string();
     assert_eq!(error, "draw 0: its record cannot be made: tripped");
-    assert!(!bench.path(0, "result.json").exists() && !bench.study.records(0).exists());
+    assert!(!fixture.path(0, "result.json").exists() && !fixture.study.records(0).exists());
 }
 
 #[test]
 fn a_disk_nearly_full_stops_the_study_before_it_is() {
-    let bench = Bench::new("exit 0");
-    let error = bench.run(|_, step| step.least_free_mib = u64::MAX).unwrap_err().to_string();
+    let fixture = StudyFixture::new("exit 0");
+    let error = fixture.run(|_, step| step.least_free_mib = u64::MAX).unwrap_err().to_string();
     assert!(error.contains("nothing is lost"), "{error}");
-    assert!(!bench.study.root.join("runs").exists());
+    assert!(!fixture.study.root.join("runs").exists());
 }
 
 #[test]
 fn another_program_does_not_go_on_with_the_results_of_one() {
-    let bench = Bench::new("exit 0");
-    bench.run(|_, _| {}).unwrap();
-    let bench = Bench { program: program(&bench.folder, "exit 1"), ..bench };
-    assert!(bench.run(|_, _| {}).unwrap_err().to_string().contains("another --label"));
-    bench.run(|_, step| step.label = "other").unwrap();
+    let fixture = StudyFixture::new("exit 0");
+    fixture.run(|_, _| {}).unwrap();
+    let fixture = StudyFixture { program: program(&fixture.folder, "exit 1"), ..fixture };
+    assert!(fixture.run(|_, _| {}).unwrap_err().to_string().contains("another --label"));
+    fixture.run(|_, step| step.label = "other").unwrap();
 }
 
 #[test]
 fn what_is_left_out_is_said_on_the_command_line() {
     // The arguments of every program come first, so that both stay what they are.
-    let bench = Bench::new("shift 10; echo \"$*\" >&2");
-    let results = bench.run(|_, step| step.without = Some(vec!["inclination".to_owned()])).unwrap();
+    let fixture = StudyFixture::new("shift 10; echo \"$*\" >&2");
+    let results = fixture.run(|_, step| step.without = Some(vec!["inclination".to_owned()])).unwrap();
     let result = results[2].as_ref().unwrap();
     assert_eq!(result.without, ["inclination"]);
     assert!(result.program.leave_out);
-    let reported = fs::read_to_string(bench.path(2, "stderr.txt")).unwrap();
+    let reported = fs::read_to_string(fixture.path(2, "stderr.txt")).unwrap();
     assert_eq!(reported, "--without inclination\n");
     // The same program with its whole catalogue is another one.
-    assert!(bench.run(|_, _| {}).unwrap_err().to_string().contains("another --label"));
+    assert!(fixture.run(|_, _| {}).unwrap_err().to_string().contains("another --label"));
 }
 
 #[test]
 fn what_is_done_is_done_again_and_records_are_dropped_when_asked() {
-    let bench = Bench::new("exit 0");
-    bench.run(|_, _| {}).unwrap();
-    fs::write(bench.path(1, "mark"), "").unwrap();
-    bench.run(|draw, step| step.again = draw.number == 0).unwrap();
-    assert!(bench.path(1, "mark").exists());
-    bench
+    let fixture = StudyFixture::new("exit 0");
+    fixture.run(|_, _| {}).unwrap();
+    fs::write(fixture.path(1, "mark"), "").unwrap();
+    fixture.run(|draw, step| step.again = draw.number == 0).unwrap();
+    assert!(fixture.path(1, "mark").exists());
+    fixture
         .run(|draw, step| {
             step.again = draw.number == 1;
             step.drop_records = true;
         })
         .unwrap();
     assert!(
-        !bench.path(1, "mark").exists() && !bench.study.records(1).exists() && bench.study.truth(1).exists()
+        !fixture.path(1, "mark").exists()
+            && !fixture.study.records(1).exists()
+            && fixture.study.truth(1).exists()
     );
 }
 

@@ -54,7 +54,7 @@ pub(crate) struct Screened {
     start: Vec<f64>,
     pub(crate) part: Part,
     /// Distance of the effect from the baseline, parameters fitted, at the specified noise.
-    pub(crate) seen: f64,
+    pub(crate) distance: f64,
     /// The same over the residual of the other effect.
     pub(crate) contrast: f64,
 }
@@ -170,7 +170,7 @@ impl Screening {
         let [least, most] = candidate.fit_bounds(0);
         start[0] = (amplitude * middle).clamp(least, most);
         let part = Part { from: from * WINDOW, rows: length * WINDOW };
-        Some(Screened { candidate, start, part, seen: square.sqrt(), contrast: share.sqrt().recip() })
+        Some(Screened { candidate, start, part, distance: square.sqrt(), contrast: share.sqrt().recip() })
     }
 
     /// The nearest law of another effect in its part; the observer has the rig with the effect as its baseline. `None` where
@@ -180,7 +180,7 @@ impl Screening {
         let priors = priors();
         let fit = Fit { observer, observed: observer.baseline(), candidate, rig: &self.rig, priors: &priors };
         let start = fit.at([&screened.start[..], &[0.0; PARAMETERS.len()]].concat())?;
-        let nearest = fit.nearest(start, screened.seen.powi(2));
+        let nearest = fit.nearest(start, screened.distance.powi(2));
         let keys = candidate.sheet.keys.len();
         let (own, deviations) = nearest.coordinates.split_at(keys);
         if !is_drawn(&candidate, own[0]) {

@@ -135,7 +135,9 @@ pub(super) fn twin_of(start: &Start, number: usize) -> Result<Twin, Refusal> {
     let whole = Observer::new(trajectory(&record, &rig));
     let screening = Screening::new(&whole, hidden, axis).ok_or(Refusal::NoRecord)?;
     let mut refusal = Refusal::NoRival;
-    for screened in screening.all().iter().filter(|screened| screened.seen >= LEAST_SEEN).take(MOST_FITTED) {
+    for screened in
+        screening.all().iter().filter(|screened| screened.distance >= LEAST_SEEN).take(MOST_FITTED)
+    {
         let observer = Observer::new(screened.part.of(&record, &rig));
         let Some(rival) = screening.fitted(screened, &observer) else {
             refusal = Refusal::NotAlike;
@@ -160,7 +162,7 @@ fn of_rival(
     if noise > MOST_NOISE {
         return Err(Refusal::NotAlike);
     }
-    let seen = screened.seen / noise;
+    let seen = screened.distance / noise;
     if seen < LEAST_SEEN {
         return Err(Refusal::NotSeen);
     }

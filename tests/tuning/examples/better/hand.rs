@@ -1,11 +1,11 @@
 //! The load axis moved by hand: valve shut, P, P with feed-forward, and the manual mode with its distinction of cases.
 
-use crate::sheet::{SEEDS, Spread};
+use crate::sheet::{MeanAndRange, SEEDS};
 use plant::Axis;
 use plant::scene::{Arm, Hand, Part};
 use rehearsal::RehearsalRow;
 use std::error::Error;
-use tuning::cases::{Case, Made, figures};
+use tuning::cases::{Case, CaseSpec, figures};
 use tuning::rehearsed::{self, Run};
 use tuning::{Trial, TrialError, in_parallel};
 
@@ -14,27 +14,31 @@ const EXPERIMENT: &str = "manual-let-go";
 const PULL_N: f64 = 3.0;
 const PULL_TO_S: f64 = 60.0;
 
-struct Subject {
+struct ControllerVariant {
     name: &'static str,
     load: &'static str,
     set: &'static [&'static str],
 }
 
-const SUBJECTS: [Subject; 5] = [
-    Subject {
+const VARIANTS: [ControllerVariant; 5] = [
+    ControllerVariant {
         name: "valve shut",
         load: "force-manual",
         set: &["load.giving-way.gain_m_per_n_s=0", "load.giving-way.velocity_feed_forward=0"],
     },
-    Subject { name: "P alone", load: "force-plain", set: &["load.giving-way.velocity_feed_forward=0"] },
-    Subject { name: "P and feed-forward, no distinction", load: "force-plain", set: &[] },
+    ControllerVariant {
+        name: "P alone",
+        load: "force-plain",
+        set: &["load.giving-way.velocity_feed_forward=0"],
+    },
+    ControllerVariant { name: "P and feed-forward, no distinction", load: "force-plain", set: &[] },
     // No hand is as fast: as in manual-move-plain.
-    Subject {
+    ControllerVariant {
         name: "always as at standstill, no distinction",
         load: "force-manual",
         set: &["load.force-chain.moving_m_per_s=1"],
     },
-    Subject { name: "manual mode, with its distinction", load: "force-manual", set: &[] },
+    ControllerVariant { name: "manual mode, with its distinction", load: "force-manual", set: &[] },
 ];
 
 pub(crate) fn table() -> Result<(), Box<dyn Error>> {
@@ -43,14 +47,20 @@ pub(crate) fn table() -> Result<(), Box<dyn Error>> {
         "| | way of 200 mm, mm | hand force mean, N | largest, N | break-away, N | slides on when let go, mm | drift in the last 2 s, mm | valve open in the last 1 s, % of the time | drift under a pull of {PULL_N} N, mm |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
-    for subject in &SUBJECTS {
-        let set: Vec<_> = subject.set.iter().map(|set| (*set).to_owned()).collect();
-        let case =
-            Case::new(&Made { experiment: EXPERIMENT, load: Some(subject.load), set: &set, drive: None })?;
+    for variant in &VARIANTS {
+        let set: Vec<_> = variant.set.iter().map(|set| (*set).to_owned()).collect();
+        let case = Case::new(&CaseSpec {
+            experiment: EXPERIMENT,
+            load: Some(variant.load),
+            set: &set,
+            drive: None,
+        })?;
         let runs = in_parallel(&SEEDS, |seed| reported(&case, *seed))?;
         let scales = [1e3, 1.0, 1.0, 1.0, 1e3, 1e3, 1e2, 1e3];
-        let cell = |place: usize| Spread::cell(Spread::of(runs.iter().map(|run| run[place])), scales[place]);
-        println!("| {} | {} |", subject.name, (0..scales.len()).map(cell).collect::<Vec<_>>().join(" | "));
+        let cell = |place: usize| {
+            MeanAndRange::cell(MeanAndRange::of(runs.iter().map(|run| run[place])), scales[place])
+        };
+        println!("| {} | {} |", variant.name, (0..scales.len()).map(cell).collect::<Vec<_>>().join(" | "));
     }
     Ok(())
 }

@@ -4,7 +4,7 @@
 mod hand;
 mod sheet;
 
-use sheet::{Column, Sheet, Subject};
+use sheet::{Column, ComparisonTable, ControllerVariant};
 use std::error::Error;
 
 const SCALE_MM: f64 = 1e3;
@@ -23,8 +23,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn point_to_point() -> Result<(), Box<dyn Error>> {
     println!("\n### point-to-point (Fig. 8)\n");
-    let drive = |name, papers| Subject { name, drive: Some(name), load: None, papers };
-    let subjects =
+    let drive = |name, is_papers| ControllerVariant { name, drive: Some(name), load: None, is_papers };
+    let variants =
         [drive("position-p", true), drive("position-pid", false), drive("position-cascade", false)];
     let columns = [
         column("dynamic, mm", "position_error_dynamic_m", SCALE_MM),
@@ -32,9 +32,9 @@ fn point_to_point() -> Result<(), Box<dyn Error>> {
         column("static, mm", "position_error_static_m", SCALE_MM),
         column("rest p-p, mm", "position_rest_peak_to_peak_smoothed_m", SCALE_MM),
     ];
-    Sheet {
+    ComparisonTable {
         experiment: "point-to-point",
-        subjects: &subjects,
+        variants: &variants,
         columns: &columns,
         halved: &["position_error_dynamic_m"],
     }
@@ -43,16 +43,21 @@ fn point_to_point() -> Result<(), Box<dyn Error>> {
 
 fn load_step() -> Result<(), Box<dyn Error>> {
     println!("\n### load-step (Fig. 9)\n");
-    let subject = |name, drive, load, papers| Subject { name, drive: Some(drive), load: Some(load), papers };
-    let subjects = [
-        subject("force-p", "position-linked", "force-p", true),
-        subject(
+    let variant = |name, drive, load, is_papers| ControllerVariant {
+        name,
+        drive: Some(drive),
+        load: Some(load),
+        is_papers,
+    };
+    let variants = [
+        variant("force-p", "position-linked", "force-p", true),
+        variant(
             "force-paper-linked, drive position-paper-linked",
             "position-paper-linked",
             "force-paper-linked",
             true,
         ),
-        subject("force-pid-map", "position-linked", "force-pid-map", false),
+        variant("force-pid-map", "position-linked", "force-pid-map", false),
     ];
     let columns = [
         column("settling 5 %, ms", "force_settling_s", SCALE_MS),
@@ -65,9 +70,9 @@ fn load_step() -> Result<(), Box<dyn Error>> {
         column("rest p-p, mm", "position_rest_peak_to_peak_smoothed_m", SCALE_MM),
         column("rest p-p, N", "force_rest_peak_to_peak_n", 1.0),
     ];
-    Sheet {
+    ComparisonTable {
         experiment: "load-step",
-        subjects: &subjects,
+        variants: &variants,
         columns: &columns,
         halved: &["force_settling_s", "force_error_motion_rms_n"],
     }

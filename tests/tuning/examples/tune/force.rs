@@ -2,25 +2,25 @@
 
 use crate::{corners, mark};
 use std::error::Error;
-use tuning::cases::{Case, Made, figures};
+use tuning::cases::{Case, CaseSpec, figures};
 use tuning::rehearsed::{gain_margin, worst_gain_margin};
 use tuning::{Trial, TrialError, in_parallel, rounded};
 
-struct Ladder {
+struct GainLadder {
     load: &'static str,
     gain: &'static str,
     unit: &'static str,
     gains: &'static [f64],
 }
 
-const LADDERS: [Ladder; 2] = [
-    Ladder {
+const LADDERS: [GainLadder; 2] = [
+    GainLadder {
         load: "force-p",
         gain: "algorithm.gain_m_per_n_s",
         unit: "m/(N s)",
         gains: &[0.002, 0.003, 0.004, 0.005, 0.006, 0.008, 0.01, 0.012, 0.015],
     },
-    Ladder {
+    GainLadder {
         load: "force-pid-map",
         gain: "algorithm.gain_per_s",
         unit: "1/s",
@@ -51,10 +51,10 @@ pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
     by_drive()
 }
 
-impl Ladder {
+impl GainLadder {
     fn case(&self, gain: Option<f64>) -> Result<Case, Box<dyn Error>> {
         let set: Vec<_> = gain.map(|gain| format!("load.{}={gain}", self.gain)).into_iter().collect();
-        Case::new(&Made { experiment: "load-step", drive: Some(DRIVE), load: Some(self.load), set: &set })
+        Case::new(&CaseSpec { experiment: "load-step", drive: Some(DRIVE), load: Some(self.load), set: &set })
     }
 }
 
@@ -82,15 +82,15 @@ fn worst(one: Figures, other: Figures) -> Figures {
 
 const HEAD: &str = "settling 5 % 0 kg / worst corner, ms | overshoot 0 kg / worst corner, % | speed ratio | peak error, mm | in motion, N | rest p-p, mm / N | margin 0 kg | margin, worst corner |";
 
-/// What a case does: at 0 kg and 7 bar the worst of some kinds of noise, in the corners that of one.
-struct Told {
+/// Figures of a case: at 0 kg and 7 bar the worst of some kinds of noise, in the corners that of one.
+struct CaseFigures {
     nominal: Figures,
     corners: Figures,
     margin: f64,
     worst_margin: f64,
 }
 
-impl Told {
+impl CaseFigures {
     fn of(case: &Case) -> Result<Self, TrialError> {
         let worst_of = |trials: &[Trial]| {
             let runs = in_parallel(trials, |trial| figures_of(case, trial))?;
@@ -122,12 +122,16 @@ impl Told {
     }
 }
 
-fn by_gain(ladder: &Ladder) -> Result<(), Box<dyn Error>> {
+fn by_gain(ladder: &GainLadder) -> Result<(), Box<dyn Error>> {
     println!("| gain, {} | {HEAD}", ladder.unit);
     println!("|---|---|---|---|---|---|---|---|---|");
-    let own = shipped(&ladder.case(None)?, ladder.gain).ok_or("no gain")?;
+    let shipped_gain = shipped(&ladder.case(None)?, ladder.gain).ok_or("no gain")?;
     for &gain in ladder.gains {
-        println!("| {} | {}", mark(gain, own == gain), Told::of(&ladder.case(Some(gain))?)?.cells());
+        println!(
+            "| {} | {}",
+            mark(gain, shipped_gain == gain),
+            CaseFigures::of(&ladder.case(Some(gain))?)?.cells()
+        );
     }
     Ok(())
 }
@@ -142,8 +146,9 @@ fn by_feed_forward() -> Result<(), Box<dyn Error>> {
                 format!("load.algorithm.gain_m_per_n_s={gain}"),
                 format!("load.algorithm.velocity_feed_forward={share}"),
             ];
-            let made = Made { experiment: "load-step", drive: Some(DRIVE), load: Some("force-p"), set: &set };
-            let case = Case::new(&made)?;
+            let spec =
+                CaseSpec { experiment: "load-step", drive: Some(DRIVE), load: Some("force-p"), set: &set };
+            let case = Case::new(&spec)?;
             let [settling_s, overshoot, ..] = figures_of(&case, &Trial::default())?;
             let margin = worst_gain_margin(&case.inputs, &case.scene)?;
             cells.push(format!("{} ms / {} % / {margin}", ms(settling_s), number(overshoot * 1e2, 1)));
@@ -159,8 +164,8 @@ fn by_drive() -> Result<(), Box<dyn Error>> {
     let loads = LADDERS.iter().map(|ladder| ladder.load);
     let pairs = loads.flat_map(|load| DRIVES.map(|drive| (load, drive))).chain([PAPER]);
     for (load, drive) in pairs {
-        let made = Made { experiment: "load-step", drive: Some(drive), load: Some(load), set: &[] };
-        println!("| {load}, {drive} | {}", Told::of(&Case::new(&made)?)?.cells());
+        let spec = CaseSpec { experiment: "load-step", drive: Some(drive), load: Some(load), set: &[] };
+        println!("| {load}, {drive} | {}", CaseFigures::of(&Case::new(&spec)?)?.cells());
     }
     Ok(())
 }

@@ -24,7 +24,7 @@ pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
     for (name, gains) in PROGRAMS {
         let path =
             Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../../controller/programs/{name}.toml"));
-        let shipped = Shipped { source: Source::read(&path)?, rig: RigParameters::baseline() };
+        let shipped = ShippedProgram { source: Source::read(&path)?, rig: RigParameters::baseline() };
         println!("\n### {name}\n");
         shipped.by_gain(gains)?;
         shipped.by_corner()?;
@@ -35,12 +35,12 @@ pub(crate) fn tables() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-struct Shipped {
+struct ShippedProgram {
     source: Source,
     rig: RigParameters,
 }
 
-impl Shipped {
+impl ShippedProgram {
     fn program(&self, gain: Option<f64>) -> Result<Program, Box<dyn Error>> {
         let mut program = self.source.program(Axis::Drive, &self.rig, false)?;
         if let (Some(place), Some(gain)) = (program.place(GAIN), gain) {
@@ -54,8 +54,8 @@ impl Shipped {
             "| gain, 1/s | dynamic, mm | static, mm | rest p-p, mm | step overshoot 0 kg / worst corner, mm | margin 0 kg | margin, worst corner |"
         );
         println!("|---|---|---|---|---|---|---|");
-        let own = self.program(None)?;
-        let own = own.place(GAIN).map(|place| own.values()[place]);
+        let shipped_gain = self.program(None)?;
+        let shipped_gain = shipped_gain.place(GAIN).map(|place| shipped_gain.values()[place]);
         for &gain in gains {
             let make = || self.program(Some(gain)).expect("made before");
             let moved = positioning(make)?;
@@ -68,7 +68,7 @@ impl Shipped {
             });
             println!(
                 "| {} | {:.2} | {:.2} | {:.2} | {:.1} / {:.1} | {margin} | {} |",
-                mark(gain, own == Some(gain)),
+                mark(gain, shipped_gain == Some(gain)),
                 moved.dynamic_m * 1e3,
                 moved.static_m * 1e3,
                 moved.rest_peak_to_peak_m * 1e3,

@@ -64,7 +64,8 @@ fn main() -> ExitCode {
     }
 }
 
-type Done = Result<(), Box<dyn Error>>;
+/// Result of a command of the study.
+type CommandResult = Result<(), Box<dyn Error>>;
 
 fn say(line: &str) {
     eprintln!("study: {line}");
@@ -85,14 +86,14 @@ const CLASSES: &str = "study/classes.json";
 const LEDGER: &str = "study/evidence/ledger.toml";
 const EXPECTED: &str = "study/outside-expected.json";
 
-fn draws(arguments: &DrawsArguments) -> Done {
+fn draws(arguments: &DrawsArguments) -> CommandResult {
     admit(arguments.plan.seed)?;
     let study = Study::begin(&arguments.out, &arguments.plan.plan())?;
     say(&format!("{} draws in {}", study.draws.len(), arguments.out.display()));
     Ok(())
 }
 
-fn limits(arguments: &LimitsArguments) -> Done {
+fn limits(arguments: &LimitsArguments) -> CommandResult {
     let limits = compute::limits(arguments.seed, &say)?;
     if arguments.write {
         write_whole(&committed(LIMITS), format!("{:#}\n", serde_json::json!(limits)).as_bytes())?;
@@ -100,7 +101,7 @@ fn limits(arguments: &LimitsArguments) -> Done {
     put_or_say(arguments.write, PAGE, "limits", &document::limit_table(&limits))
 }
 
-fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
+fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> CommandResult {
     let study = Study::open(&arguments.out)?;
     compute::classes(&study, arguments.done.as_deref(), arguments.jobs, stop, &say)?;
     if arguments.write && !stop.load(Ordering::Relaxed) {
@@ -112,7 +113,7 @@ fn cosines(arguments: &CosinesArguments, stop: &AtomicBool) -> Done {
     Ok(())
 }
 
-fn forms(arguments: &FormsArguments, stop: &AtomicBool) -> Done {
+fn forms(arguments: &FormsArguments, stop: &AtomicBool) -> CommandResult {
     let kinds = if arguments.far_only { &[Form::Far][..] } else { &OTHERS };
     let of = Selection { effects: &arguments.effects, place: arguments.place.as_deref(), forms: kinds };
     let residuals = forms::residuals(&of, arguments.jobs, stop, &say)?;
@@ -123,13 +124,13 @@ fn forms(arguments: &FormsArguments, stop: &AtomicBool) -> Done {
     put_or_say(arguments.write, FORMS_PAGE, "forms", &text)
 }
 
-fn ledger(arguments: &LedgerArguments) -> Done {
+fn ledger(arguments: &LedgerArguments) -> CommandResult {
     let text = Ledger::read(&committed(LEDGER))?.markdown();
     put_or_say(arguments.write, SEEDS_PAGE, "ledger", &text)
 }
 
 /// Puts a table between its marks of a page, or says it.
-fn put_or_say(write: bool, page: &str, name: &str, table: &str) -> Done {
+fn put_or_say(write: bool, page: &str, name: &str, table: &str) -> CommandResult {
     if write {
         document::put(&committed(page), name, table)?;
     } else {
@@ -139,11 +140,11 @@ fn put_or_say(write: bool, page: &str, name: &str, table: &str) -> Done {
 }
 
 /// Refuses a seed that is neither for development nor in the ledger.
-fn admit(seed: u64) -> Done {
+fn admit(seed: u64) -> CommandResult {
     Ok(Ledger::read(&committed(LEDGER))?.admit(seed)?)
 }
 
-fn twins(arguments: &TwinsArguments, stop: &AtomicBool) -> Done {
+fn twins(arguments: &TwinsArguments, stop: &AtomicBool) -> CommandResult {
     admit(arguments.seed)?;
     let TwinsArguments { out, seed, count, jobs } = arguments;
     if out.join("twins.json").exists() {
@@ -161,7 +162,7 @@ fn twins(arguments: &TwinsArguments, stop: &AtomicBool) -> Done {
     Ok(())
 }
 
-fn resolve(arguments: &ResolveArguments) -> Done {
+fn resolve(arguments: &ResolveArguments) -> CommandResult {
     if arguments.twins {
         return resolve_twins(arguments);
     }
@@ -179,7 +180,7 @@ fn resolve(arguments: &ResolveArguments) -> Done {
     Ok(())
 }
 
-fn resolve_twins(arguments: &ResolveArguments) -> Done {
+fn resolve_twins(arguments: &ResolveArguments) -> CommandResult {
     let ResolveArguments { out, label, write, .. } = arguments;
     let table = study::twins::tables::Table::of(&Twins::open(out)?, out, label)?;
     let text = table.markdown();

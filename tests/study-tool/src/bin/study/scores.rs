@@ -1,7 +1,7 @@
 //! The commands that score: one label as a page, several labels as tables, several noise factors as curves.
 
 use crate::cli::{Column, CompareArguments, CurveArguments, ScoreArguments, WorldsArguments};
-use crate::{Done, EARLIER, EXPECTED, LIMITS, PAGE, committed, known_classes, read_if_there, say};
+use crate::{CommandResult, EARLIER, EXPECTED, LIMITS, PAGE, committed, known_classes, read_if_there, say};
 use std::error::Error;
 use std::path::PathBuf;
 use study::curve::Curves;
@@ -12,7 +12,7 @@ use study::score::{Score, ScoreInputs};
 use study::worlds::Worlds;
 use study::{compare, document, page, score};
 
-pub(crate) fn score(arguments: &ScoreArguments) -> Done {
+pub(crate) fn score(arguments: &ScoreArguments) -> CommandResult {
     let score = scored(&arguments.folders, &arguments.label, false)?;
     let folder = arguments.to.as_ref().unwrap_or(&arguments.folders[0]);
     let path = |extension: &str| folder.join(format!("score-{}.{extension}", arguments.label));
@@ -27,7 +27,7 @@ pub(crate) fn score(arguments: &ScoreArguments) -> Done {
 }
 
 /// Scores both worlds of a study; draws without a result are skipped.
-pub(crate) fn worlds(arguments: &WorldsArguments) -> Done {
+pub(crate) fn worlds(arguments: &WorldsArguments) -> CommandResult {
     let WorldsArguments { folders, label, left_out, other, write } = arguments;
     let of_label = |label| scored(folders, label, true);
     let left_out = left_out.as_deref().map(of_label).transpose()?;
@@ -45,7 +45,7 @@ pub(crate) fn worlds(arguments: &WorldsArguments) -> Done {
     Ok(())
 }
 
-pub(crate) fn compare(arguments: &CompareArguments) -> Done {
+pub(crate) fn compare(arguments: &CompareArguments) -> CommandResult {
     let scores = all(&arguments.columns)?;
     let text = compare::markdown(&scores)?;
     if let Some(path) = &arguments.to {
@@ -61,7 +61,7 @@ pub(crate) fn compare(arguments: &CompareArguments) -> Done {
     Ok(())
 }
 
-pub(crate) fn curve(arguments: &CurveArguments) -> Done {
+pub(crate) fn curve(arguments: &CurveArguments) -> CommandResult {
     let scores = all(&arguments.columns)?;
     let curves = Curves::new(&scores)?;
     let (text, picture) = (curves.markdown(), curves.svg()?);
