@@ -4,7 +4,7 @@
 //! `counting-emulator` and `counting-controller` of `tests/counting/`; a script that has built them sets it. Without it cargo
 //! builds the release profile, and says itself where the results are.
 
-use crate::process::{Ended, Running};
+use crate::process::{CompletedProcess, Running};
 use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -103,7 +103,7 @@ pub fn shipped_experiments() -> Vec<(String, PathBuf)> {
 }
 
 /// Runs one of `scripts` on the shipped build, for so long at most.
-pub fn script(name: &str, arguments: &[&str], limit: Duration) -> Ended {
+pub fn script(name: &str, arguments: &[&str], limit: Duration) -> CompletedProcess {
     let mut command = Command::new(workspace().join("scripts").join(name));
     command.args(arguments).env("AIRBENCH_BIN_DIR", shipped_programs());
     Running::start(&format!("scripts/{name}"), &mut command).wait_within(limit)

@@ -1,5 +1,5 @@
-//! Runs in lockstep with a script of faults, and everything that they leave: the rig with one member that opens the valves as it
-//! is given and writes down what it hears.
+//! Runs in lockstep with a script of faults, and their files: the rig with one member that commands given openings and records
+//! the frames that it receives.
 
 use crate::launch::Pace;
 use crate::records::{Table, text};
@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::path::Path;
 
 #[derive(Clone, Copy)]
-pub struct Plan<'a> {
+pub struct FaultRunPlan<'a> {
     /// `[rig]` of the experiment, with what follows it.
     pub rig: &'a str,
     pub faults: &'a str,
@@ -21,14 +21,15 @@ pub struct Plan<'a> {
     pub act: fn(u32) -> Option<[f64; 2]>,
 }
 
-impl Default for Plan<'_> {
+impl Default for FaultRunPlan<'_> {
     fn default() -> Self {
         let act = |_| Some([0.0, 0.0]);
         Self { rig: "carriage_position_m = 0.25\n", faults: "", bus: "", cycles: 400, act }
     }
 }
 
-pub struct Left {
+/// Files of a run, and the frames that its member received.
+pub struct FaultRun {
     pub scene: Scene,
     pub measurement: Table,
     pub truth: Table,
@@ -82,15 +83,15 @@ pub fn fault(name: &str, at: &str, numbers: &str) -> String {
     format!("[[fault]]\nname = \"{name}\"\nat = \"{at}\"\nfrom_s = {from_s}\nto_s = {to_s}\n{numbers}\n")
 }
 
-impl Plan<'_> {
+impl FaultRunPlan<'_> {
     /// Makes the run and holds that it left its marks in every log.
-    pub fn run_with_marks(&self) -> Left {
-        let left = self.run();
-        left.expect_marks_in_every_log();
-        left
+    pub fn run_with_marks(&self) -> FaultRun {
+        let outcome = self.run();
+        outcome.expect_marks_in_every_log();
+        outcome
     }
 
-    pub fn run(&self) -> Left {
+    pub fn run(&self) -> FaultRun {
         let scene = Scene::new(&format!("title = \"broken\"\n[rig]\n{}", self.rig));
         let mut emulator = scene.emulator(Pace::Lockstep).with("--seconds");
         emulator = emulator.with(&format!("{}", self.cycles as f64 * 1e-3));
@@ -111,13 +112,13 @@ impl Plan<'_> {
             let echo = (cycle % 4096) as u16;
             let [drive, load] = openings.map(|opening| ValveCommand { opening, alive, echo, enable: true });
             for frame in [Frame::DriveValveCommand(drive), Frame::LoadValveCommand(load)] {
-                peer.say(&frame);
+                peer.send_frame(&frame);
             }
         });
         emulator.wait().expect_code(0);
         let measurement = scene.measurement();
         assert_eq!(measurement.len(), self.cycles);
-        Left {
+        FaultRun {
             measurement,
             truth: scene.truth(),
             summary: scene.summary(),
@@ -128,7 +129,7 @@ impl Plan<'_> {
     }
 }
 
-impl Left {
+impl FaultRun {
     pub fn rows(&self) -> Vec<Row> {
         rows(&self.scene.path("emulator/faults.csv"))
     }

@@ -74,7 +74,7 @@ impl Disturbance {
 }
 
 #[derive(Clone, Debug)]
-pub struct Named {
+pub struct NamedCause {
     pub cause: String,
     pub sentence: String,
     /// The causes of all findings of the report, the named one among them.
@@ -82,7 +82,7 @@ pub struct Named {
 }
 
 /// Runs emulator and controller for some seconds with a disturbance after `after`, reports, and has the cause named.
-pub fn run(disturbance: Disturbance, after: Duration) -> Named {
+pub fn run(disturbance: Disturbance, after: Duration) -> NamedCause {
     let scene = Scene::new(RESTLESS);
     if disturbance == Disturbance::PageFaults {
         own::page_faulting(&scene);
@@ -113,7 +113,7 @@ fn inject(disturbance: Disturbance, scene: &Scene, emulator: &Running, controlle
         Disturbance::Nothing | Disturbance::PageFaults | Disturbance::FrameLoss => {}
         Disturbance::EmulatorStopped => stop(emulator),
         Disturbance::ControllerStopped => stop(controller),
-        Disturbance::CpuContention => hog(),
+        Disturbance::CpuContention => occupy_cpu(),
         Disturbance::SlowListener => {
             let listener = scene.peer();
             std::thread::sleep(Duration::from_millis(1500));
@@ -129,7 +129,7 @@ fn stop(process: &Running) {
     process.signal(Signal::CONT);
 }
 
-fn hog() {
+fn occupy_cpu() {
     let hog = std::thread::spawn(|| {
         let grants =
             realtime::acquire(&Request { fifo_priority: Some(99), cpu: Some(RIG_CPU), ..Request::default() });
@@ -158,14 +158,14 @@ fn step_the_clock(scene: &Scene) {
     ahead(-STEP_S);
 }
 
-fn name_cause(out: &Path) -> Named {
+fn name_cause(out: &Path) -> NamedCause {
     let report = out.join("report");
     Program::Bench.start(&[&"report", &out, &"--out", &report]).wait().expect_code(0);
     let file = report.join("report.json");
     let named = Program::Bench.start(&[&"cause", &file]).wait().expect_code(0);
     let report = records::json(&file);
     let findings = report["findings"].as_array().expect("a report holds its findings");
-    Named {
+    NamedCause {
         cause: named.stdout.trim().to_owned(),
         sentence: named.stderr.trim().to_owned(),
         findings: findings

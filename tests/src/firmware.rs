@@ -107,15 +107,15 @@ pub fn positioned(frames: &[CanFrame], repetitions: u64) -> Positioned {
 /// The same, of which a machine that stood still may have left nothing.
 pub fn positioned_where_it_ran(frames: &[CanFrame], repetitions: u64) -> Positioned {
     let experiment_cycles = repetitions * 2 * (MOVE_CYCLES + REST_CYCLES);
-    let mut counted = Counted::default();
-    frames.iter().filter_map(|frame| Frame::decode(frame).ok()).for_each(|frame| counted.take(&frame));
-    let began = counted.began.expect("it told that its experiment began");
+    let mut trace = BusTrace::default();
+    frames.iter().filter_map(|frame| Frame::decode(frame).ok()).for_each(|frame| trace.take(&frame));
+    let began = trace.began.expect("it told that its experiment began");
     let mut done = Positioned::default();
     let mut rests: BTreeMap<u64, Vec<f64>> = BTreeMap::new();
-    for (cycle, position_m) in counted.positions_m.range(began..began + experiment_cycles) {
+    for (cycle, position_m) in trace.positions_m.range(began..began + experiment_cycles) {
         let (set_point_m, part, within) = set_point(cycle - began);
         let error_m = (set_point_m - position_m).abs();
-        let held_up = counted.held_up.range(cycle.saturating_sub(RECOVERY_CYCLES)..=*cycle);
+        let held_up = trace.held_up.range(cycle.saturating_sub(RECOVERY_CYCLES)..=*cycle);
         if held_up.count() > 0 {
             done.left_out += 1;
             continue;
@@ -130,8 +130,8 @@ pub fn positioned_where_it_ran(frames: &[CanFrame], repetitions: u64) -> Positio
     done.rests = rests.len();
     let means = rests.values().map(|errors_m| errors_m.iter().sum::<f64>() / errors_m.len() as f64);
     done.position_error_static_m = means.fold(0.0, f64::max);
-    for (cycle, told_m) in counted.set_points_m.range(began + 1..began + experiment_cycles) {
-        done.set_point_error_m = done.set_point_error_m.max((set_point(cycle - began).0 - told_m).abs());
+    for (cycle, reported_m) in trace.set_points_m.range(began + 1..began + experiment_cycles) {
+        done.set_point_error_m = done.set_point_error_m.max((set_point(cycle - began).0 - reported_m).abs());
         done.set_points += 1;
     }
     done
@@ -145,9 +145,9 @@ fn set_point(cycle: u64) -> (f64, u64, u64) {
     (from_m + (to_m - from_m) * (z - libm::sin(TAU * z) / TAU), part, within)
 }
 
-/// Frames by the rig's cycles, those that it skipped counted, as anybody on the bus can know them.
+/// Frames by the rig's cycles, skipped ones included, as far as they can be known from the bus.
 #[derive(Default)]
-struct Counted {
+struct BusTrace {
     cycle: u64,
     /// In lockstep frames of a cycle are sorted by identifier, and commands come first; in real time they come last, as they
     /// are sent.
@@ -163,7 +163,7 @@ struct Counted {
     set_points_m: BTreeMap<u64, f64>,
 }
 
-impl Counted {
+impl BusTrace {
     fn take(&mut self, frame: &Frame) {
         match frame {
             Frame::Tick(tick) => (self.cycle, self.lockstep) = (u64::from(tick.cycle), tick.lockstep),
@@ -178,15 +178,15 @@ impl Counted {
                     self.held_up.insert(self.cycle);
                 }
                 self.answered = answered;
-                std::mem::take(&mut self.waiting).iter().for_each(|frame| self.take_told(frame));
+                std::mem::take(&mut self.waiting).iter().for_each(|frame| self.take_report(frame));
             }
-            reported if self.lockstep => self.take_told(reported),
+            reported if self.lockstep => self.take_report(reported),
             reported => self.waiting.push(*reported),
         }
     }
 
     /// Processes a report on the cycle that it answers.
-    fn take_told(&mut self, reported: &Frame) {
+    fn take_report(&mut self, reported: &Frame) {
         match reported {
             Frame::DriveChainStatus(status) if status.main_chain == MainChainState::Experiment => {
                 self.began.get_or_insert(self.answered);

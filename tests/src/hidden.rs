@@ -78,7 +78,7 @@ pub fn rig_with(scene: &Scene, effects: &[Switched]) -> PathBuf {
 
 /// What a run of both programs in real time showed of the rig's loop.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Live {
+pub struct LoopTiming {
     pub cycles: u64,
     /// Cycles computed late and not sent.
     pub missed: u64,
@@ -92,7 +92,7 @@ pub struct Live {
 }
 
 /// Runs emulator and controllers in real time with these effects; the run lies in the folder `run` of the scene.
-pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> Live {
+pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> LoopTiming {
     let rig = rig_with(scene, effects);
     let folder = scene.path("run");
     let options = format!("--seconds {seconds} --full-timing --no-flight");
@@ -106,7 +106,7 @@ pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> Live {
     let [woke, done, others] = ["woke_ns", "done_ns", "run_delay_ns"].map(|column| rows.column(column));
     // The first second touches memory for the first time.
     let work_ns = (1000..rows.len()).map(|row| done[row] - woke[row] - others[row]);
-    Live {
+    LoopTiming {
         cycles: count(&summary, "/cycles"),
         missed: count(&summary, "/skipped"),
         overworked: work_ns.filter(|ns| *ns > PERIOD_NS).count() as u64,

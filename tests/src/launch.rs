@@ -1,7 +1,7 @@
 //! The command line of a program in a scene.
 
 use crate::binaries::{Build, Program, executable, workspace};
-use crate::process::{Ended, Running};
+use crate::process::{CompletedProcess, Running};
 use crate::scene::Scene;
 use std::ffi::OsString;
 use std::os::unix::process::CommandExt;
@@ -18,13 +18,13 @@ pub enum Pace {
 }
 
 /// Runs emulator and controller until both have ended well.
-pub fn run_both(emulator: &Launch, controller: &Launch) -> [Ended; 2] {
+pub fn run_both(emulator: &Launch, controller: &Launch) -> [CompletedProcess; 2] {
     both_good(emulator.start(), controller.start())
 }
 
 /// Waits until both have ended well, the emulator first.
 #[track_caller]
-pub fn both_good(emulator: Running, other: Running) -> [Ended; 2] {
+pub fn both_good(emulator: Running, other: Running) -> [CompletedProcess; 2] {
     [emulator.wait().expect_code(0), other.wait().expect_code(0)]
 }
 

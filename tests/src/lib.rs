@@ -2,23 +2,23 @@
 //!
 //! ```text
 //!   Scene ── a folder of its own: socket, rig file, experiment file, one output folder for each program
-//!     └─ Launch ── command line ──► Running ── signals, deadlines, stderr ──► Ended ── exit code
+//!     └─ Launch ── command line ──► Running ── signals, deadlines, stderr ──► CompletedProcess ── exit code
 //!   Peer ─── the embedded bus as a foreign program sees it: raw packets in and out
 //!   records ─ measurement.csv, truth.csv, bus.log, summary.json, read as strictly as they are promised;
 //!             axis_table the tables of the controllers, bus_cycles the log by the rig's cycles
 //!   exit ──── exit codes as they are promised
-//!   broken ── a run with faults on purpose, and what it leaves
+//!   broken ── a run with injected faults, and its files
 //!   xcp ───── a client of the controllers' XCP, packet by packet, and the foreign one in Python
 //!   foreign_python  scripts with the packages that the product is held against
 //!   guest ─── a virtual machine with real SocketCAN, and what came back from it
-//!   door ──── the gateway, and a client that does what it is asked
+//!   gateway ─ the gateway as a process, and a client of its protocol
 //!   onlooker  a viewer of the telemetry, and the live page as programs see it
 //!   discrepancy  the workflow as a program
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   firmware  a controller in C, for Linux and as an ELF, and how well it positions
 //!   own ───── algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
-//!   noise ── a node that babbles, and whether it was ever obeyed
+//!   noise ── a babbling node, and whether any of its commands acted
 //!   pairs ─── runs with something and without, in turns, and the table of what it costs
 //!   socketcan  programs of SocketCAN under `bench can`, and what was recorded of them on vcan
 //!   stalls ── whether the machine kept a program from running
@@ -37,11 +37,11 @@ pub mod broken;
 pub mod bus_cycles;
 pub mod discrepancy;
 pub mod disturb;
-pub mod door;
 pub mod events;
 pub mod exit;
 pub mod firmware;
 pub mod foreign_python;
+pub mod gateway;
 pub mod guest;
 pub mod hidden;
 mod launch;
@@ -68,7 +68,7 @@ pub use binaries::{
 };
 pub use launch::{Launch, Pace, both_good, run_both};
 pub use peer::{Packet, Peer};
-pub use process::{Ended, PATIENCE, Running, wait_until};
+pub use process::{CompletedProcess, PATIENCE, Running, wait_until};
 pub use records::{
     Table, bus_log, bus_log_to_last_whole_line, count, count_of_id, dropped_at_queue, expect_same,
     expect_whole_lines, find, json, same, text, timing_rows,

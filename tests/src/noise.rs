@@ -1,4 +1,4 @@
-//! Noise on the bus while the loop runs, and whether any of it was ever obeyed.
+//! Noise on the bus while the loop runs, and whether any of its commands ever acted.
 //!
 //! Frames are drawn over all identifiers, lengths and data, a quarter of them on the two identifiers of valve commands. Those
 //! that happen to be as `rig.dbc` says are drawn again: a sensor frame or an emergency stop of a stranger is one, since CAN
@@ -8,7 +8,7 @@
 //! It is not can-utils' cangen that makes the noise: that one speaks SocketCAN alone, holds no rate, counts nothing by kind, and
 //! sends what happens to be an emergency stop. `tests/tests/vm_cards.rs` has it fill a card's queue.
 //!
-//! What was obeyed is judged by what the controllers themselves recorded of their commands, not by what the rig made of the bus.
+//! What acted is judged by what the controllers themselves recorded of their commands, not by what the rig made of the bus.
 
 use crate::launch::Pace;
 use crate::peer::Peer;
@@ -43,17 +43,17 @@ const ROUNDING_STEPS: f64 = 0.51;
 pub const PER_SECOND: u32 = 10_000;
 
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sent {
+pub struct NoiseCounts {
     pub frames: u64,
     /// Those on an identifier of `rig.dbc`, wrong in length, value or checksum.
     pub malformed: u64,
     pub duration_s: f64,
 }
 
-/// A node that babbles until it is asked to end.
+/// A babbling node, until it is stopped.
 pub struct Noise {
     stop: Arc<AtomicBool>,
-    thread: JoinHandle<Sent>,
+    thread: JoinHandle<NoiseCounts>,
 }
 
 impl Noise {
@@ -66,15 +66,15 @@ impl Noise {
         Self { stop, thread }
     }
 
-    pub fn end(self) -> Sent {
+    pub fn end(self) -> NoiseCounts {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().expect("the noise does not panic")
     }
 }
 
-fn babble(peer: &Peer, per_second: u32, seed: u64, stop: &AtomicBool) -> Sent {
+fn babble(peer: &Peer, per_second: u32, seed: u64, stop: &AtomicBool) -> NoiseCounts {
     let mut random = Pcg64::seed_from_u64(seed);
-    let mut sent = Sent::default();
+    let mut sent = NoiseCounts::default();
     let began = Instant::now();
     while !stop.load(Ordering::Relaxed) {
         let due = (began.elapsed().as_secs_f64() * f64::from(per_second)) as u64;
@@ -139,7 +139,7 @@ fn is_command(frame: &CanFrame) -> bool {
 /// What became of a run in real time, with noise or without.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    pub sent: Sent,
+    pub sent: NoiseCounts,
     pub missed: u64,
     /// Its wake-ups that came late enough to be counted.
     pub overruns: u64,
@@ -154,7 +154,7 @@ pub struct Outcome {
     pub unknown: u64,
     /// Commands that were refused as stale, or grew stale while acting.
     pub stale: u64,
-    pub obeyed: Obeyed,
+    pub openings: OpeningCounts,
 }
 
 /// Runs rig and controllers in real time for so long, with so many frames of noise each second.
@@ -170,12 +170,12 @@ pub fn run(seconds: u32, per_second: u32, seed: u64) -> Outcome {
     outcome(&scene, sent)
 }
 
-fn outcome(scene: &Scene, sent: Sent) -> Outcome {
+fn outcome(scene: &Scene, sent: NoiseCounts) -> Outcome {
     let summary = scene.summary();
     let reported = scene.report();
     let of = |pointer: &str| count(&summary, pointer);
-    let mut obeyed = Obeyed::default();
-    Axis::NAMES.iter().for_each(|axis| obeyed.add(scene, axis));
+    let mut openings = OpeningCounts::default();
+    Axis::NAMES.iter().for_each(|axis| openings.add(scene, axis));
     Outcome {
         sent,
         missed: of("/skipped"),
@@ -187,22 +187,22 @@ fn outcome(scene: &Scene, sent: Sent) -> Outcome {
         malformed: of("/frames_ignored/malformed"),
         unknown: of("/frames_ignored/unknown"),
         stale: of("/stale_commands"),
-        obeyed,
+        openings,
     }
 }
 
 /// Openings that acted against those that a controller recorded as sent.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Obeyed {
+pub struct OpeningCounts {
     /// Openings that acted.
-    pub openings: usize,
+    pub acted: usize,
     /// Those that no controller had sent.
-    pub wrong: usize,
+    pub not_sent: usize,
     /// Cycles in which a valve was shut though its controller wanted it open.
     pub shut: usize,
 }
 
-impl Obeyed {
+impl OpeningCounts {
     /// Adds those of an axis. The load's controller holds its valve shut throughout, so whatever acts there is wrong.
     fn add(&mut self, scene: &Scene, axis: &str) {
         let acted = scene.measurement().column(&format!("{axis}_valve"));
@@ -215,11 +215,11 @@ impl Obeyed {
             let live = answered.saturating_sub(STALE_CYCLES)..answered;
             let sent = |row| if enabled[row] > 0.0 { openings[row] } else { 0.0 };
             let known = live.clone().any(|row| (sent(row) - acted).abs() * OPENING_STEPS < ROUNDING_STEPS);
-            self.openings += 1;
+            self.acted += 1;
             match acted {
                 _ if known || live.is_empty() => {}
                 0.0 => self.shut += 1,
-                _ => self.wrong += 1,
+                _ => self.not_sent += 1,
             }
         }
     }

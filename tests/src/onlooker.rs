@@ -1,4 +1,4 @@
-//! Who looks on at a run: a viewer of the telemetry, and the live page as a program sees it.
+//! Observers of a run: a viewer of the telemetry, and the live page as a program reads it.
 
 use crate::binaries::Program;
 use crate::process::{PATIENCE, Running, wait_until};
@@ -15,13 +15,13 @@ pub struct Viewer {
     decoder: Decoder,
 }
 
-/// A cycle as a viewer was given it: its number, and a value for each column.
-pub type ToldCycle = (u64, Vec<f64>);
+/// A cycle of the telemetry: its number, and a value for each column.
+pub type TelemetryCycle = (u64, Vec<f64>);
 
 #[derive(Debug, Default)]
-pub struct Told {
+pub struct ReceivedTelemetry {
     pub description: Value,
-    pub cycles: Vec<ToldCycle>,
+    pub cycles: Vec<TelemetryCycle>,
     pub events: Vec<Value>,
     /// Lines of the interval log.
     pub histograms: Vec<String>,
@@ -59,7 +59,7 @@ impl Viewer {
     }
 
     /// Sends a line, and gives the answer to it.
-    pub fn ask(&mut self, line: &str) -> Value {
+    pub fn request(&mut self, line: &str) -> Value {
         writeln!(self.stream, "{line}").expect("the emulator listens");
         loop {
             if let Packet::Answer(text) = self.packet().expect("the run goes on") {
@@ -68,8 +68,8 @@ impl Viewer {
         }
     }
 
-    pub fn to_the_end(mut self) -> Told {
-        let mut reported = Told::default();
+    pub fn to_the_end(mut self) -> ReceivedTelemetry {
+        let mut reported = ReceivedTelemetry::default();
         let json = |text: &str| serde_json::from_str(text).expect("JSON");
         while let Some(packet) = self.packet() {
             match packet {
@@ -119,9 +119,9 @@ impl LivePage {
     /// The page of a program that is it, or starts it and ends with it.
     pub fn announced_by(mut running: Running) -> Self {
         running.wait_for("Ctrl-C ends it");
-        let said = running.stderr();
+        let output = running.stderr();
         let address =
-            said.split_whitespace().find_map(|word| word.strip_prefix("http://")).expect("an address");
+            output.split_whitespace().find_map(|word| word.strip_prefix("http://")).expect("an address");
         let (address, token) = address.split_once('/').expect("a path");
         let token = token.strip_prefix("#token=").unwrap_or_default().to_owned();
         Self { running, address: address.parse().expect("an address"), token }

@@ -7,11 +7,12 @@ use std::time::Instant;
 /// A figure of a run: its name, and how it is read.
 pub type Figure<T> = (&'static str, fn(&T) -> f64);
 
-/// Runs so many pairs, without and with; `run` is given which, and the pair's number from 1. `tell` says something of each pair.
+/// Runs so many pairs, without and with; `run` is given which, and the pair's number from 1. `describe` says something of each
+/// pair.
 pub fn in_turns<T>(
     pairs: u32,
     mut run: impl FnMut(bool, u32) -> T,
-    tell: impl Fn(&T, &T) -> String,
+    describe: impl Fn(&T, &T) -> String,
 ) -> Vec<(T, T)> {
     let began = Instant::now();
     let mut runs = Vec::new();
@@ -25,7 +26,7 @@ pub fn in_turns<T>(
             (run(false, pair), with)
         };
         let left_s = began.elapsed().as_secs_f64() / f64::from(pair) * f64::from(pairs - pair);
-        eprintln!("{pair} of {pairs}, {left_s:.0} s left: {}", tell(&without, &with));
+        eprintln!("{pair} of {pairs}, {left_s:.0} s left: {}", describe(&without, &with));
         runs.push((without, with));
     }
     runs

@@ -52,7 +52,7 @@ impl Peer {
     }
 
     /// Sends a frame whose values are in range.
-    pub fn say(&self, frame: &Frame) {
+    pub fn send_frame(&self, frame: &Frame) {
         self.send(&frame.encode().expect("in range").to_bytes());
     }
 
@@ -103,7 +103,9 @@ impl Peer {
 
     /// Takes part in the lockstep barrier as a console that says something in some cycles.
     pub fn be_console(&self, mut say: impl FnMut(u32) -> Option<Frame>) {
-        self.take_part("console", |peer, cycle, _| say(cycle).iter().for_each(|frame| peer.say(frame)));
+        self.take_part("console", |peer, cycle, _| {
+            say(cycle).iter().for_each(|frame| peer.send_frame(frame))
+        });
     }
 
     /// Takes part in the lockstep barrier until the host goes: `act` is given the cycle and its frames, and sends through the

@@ -1,4 +1,4 @@
-//! A program while it runs, and what is left of it: exit code and everything it said.
+//! A program while it runs, and once it has ended: exit code and all its output.
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
@@ -13,8 +13,8 @@ use std::time::{Duration, Instant};
 /// How long anything may take that should take a moment: a protection against hanging, no measure.
 pub const PATIENCE: Duration = Duration::from_secs(300);
 
-/// So many limits a program has that says something in each: on a slow machine it is slow, and does not hang.
-const LIMITS_WHILE_IT_SAYS: u32 = 6;
+/// Number of limits that a program may take while it writes something in each of them: it is slow, and does not hang.
+const LIMITS_WHILE_IT_WRITES: u32 = 6;
 
 const POLL: Duration = Duration::from_millis(5);
 
@@ -23,17 +23,17 @@ pub struct Running {
     name: String,
     child: Child,
     input: Option<ChildStdin>,
-    output: [Said; 2],
+    output: [CapturedOutput; 2],
 }
 
-/// What a program wrote to a stream, gathered as it comes.
-struct Said {
+/// What a program wrote to a stream, captured as it comes.
+struct CapturedOutput {
     text: Arc<Mutex<String>>,
     reader: Option<JoinHandle<()>>,
 }
 
 #[derive(Debug)]
-pub struct Ended {
+pub struct CompletedProcess {
     pub name: String,
     /// Exit code; `None` when a signal ended it.
     pub code: Option<i32>,
@@ -46,8 +46,8 @@ impl Running {
     pub fn start(name: &str, command: &mut Command) -> Self {
         command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped()).process_group(0);
         let mut child = command.spawn().unwrap_or_else(|error| panic!("{name} does not start: {error}"));
-        let stderr = Said::gather(child.stderr.take().expect("stderr is piped"));
-        let stdout = Said::gather(child.stdout.take().expect("stdout is piped"));
+        let stderr = CapturedOutput::capture(child.stderr.take().expect("stderr is piped"));
+        let stdout = CapturedOutput::capture(child.stdout.take().expect("stdout is piped"));
         let input = child.stdin.take();
         Self { name: name.into(), child, input, output: [stderr, stdout] }
     }
@@ -67,8 +67,9 @@ impl Running {
             let mut threads = std::fs::read_dir(&tasks).into_iter().flatten().flatten();
             // The state follows the name, which may hold anything but ends with the last bracket.
             let stands = |stat: &str| stat.rsplit(')').next().is_some_and(|rest| rest.starts_with(" T"));
-            threads
-                .all(|own| std::fs::read_to_string(own.path().join("stat")).is_ok_and(|stat| stands(&stat)))
+            threads.all(|thread| {
+                std::fs::read_to_string(thread.path().join("stat")).is_ok_and(|stat| stands(&stat))
+            })
         });
     }
 
@@ -89,8 +90,8 @@ impl Running {
         self.output[1].so_far()
     }
 
-    fn heard_bytes(&self) -> usize {
-        self.output.iter().map(Said::bytes).sum()
+    fn output_bytes(&self) -> usize {
+        self.output.iter().map(CapturedOutput::bytes).sum()
     }
 
     pub fn number(&self) -> u32 {
@@ -107,7 +108,7 @@ impl Running {
         while self.stderr().matches(text).count() < times {
             let gone = self.child.try_wait().expect("a child can be waited for").is_some();
             if gone {
-                self.output.iter_mut().for_each(Said::finish);
+                self.output.iter_mut().for_each(CapturedOutput::finish);
                 let output = self.stderr();
                 assert!(
                     output.matches(text).count() >= times,
@@ -121,23 +122,23 @@ impl Running {
         }
     }
 
-    pub fn wait(self) -> Ended {
+    pub fn wait(self) -> CompletedProcess {
         self.wait_within(PATIENCE)
     }
 
-    /// Without asking again and again, which would disturb runs in real time beside it. A program hangs that has said nothing in
-    /// a whole `limit`, or has not ended after [`LIMITS_WHILE_IT_SAYS`].
-    pub fn wait_within(mut self, limit: Duration) -> Ended {
-        let last = Instant::now() + limit * LIMITS_WHILE_IT_SAYS;
-        let (mut until, mut heard) = (Instant::now() + limit, self.heard_bytes());
+    /// Waits without polling, which would disturb runs in real time beside it. A program hangs that has written nothing in a
+    /// whole `limit`, or has not ended after [`LIMITS_WHILE_IT_WRITES`].
+    pub fn wait_within(mut self, limit: Duration) -> CompletedProcess {
+        let last = Instant::now() + limit * LIMITS_WHILE_IT_WRITES;
+        let (mut until, mut previous_bytes) = (Instant::now() + limit, self.output_bytes());
         // Whoever waited for a word may have met its end, and then there is no process any more.
         while self.child.try_wait().expect("a child can be waited for").is_none() {
             let now = Instant::now();
             if now >= until {
-                let said = self.heard_bytes();
-                let hangs = said == heard || now >= last;
+                let bytes = self.output_bytes();
+                let hangs = bytes == previous_bytes || now >= last;
                 assert!(!hangs, "{} hangs; it said:\n{}\n{}", self.name, self.stdout(), self.stderr());
-                (until, heard) = (now + limit, said);
+                (until, previous_bytes) = (now + limit, bytes);
             }
             let left = until.saturating_duration_since(now);
             let left = Timespec::try_from(left).expect("a limit of hours at most");
@@ -146,8 +147,8 @@ impl Running {
             assert!(matches!(ended, Ok(_) | Err(Errno::INTR)), "waiting for {}: {ended:?}", self.name);
         }
         let status = self.child.wait().expect("a child can be waited for");
-        self.output.iter_mut().for_each(Said::finish);
-        Ended {
+        self.output.iter_mut().for_each(CapturedOutput::finish);
+        CompletedProcess {
             name: self.name.clone(),
             code: status.code(),
             signal: status.signal(),
@@ -157,13 +158,13 @@ impl Running {
     }
 
     /// Kills it at once, as a crash would, and waits until it is gone.
-    pub fn kill(self) -> Ended {
+    pub fn kill(self) -> CompletedProcess {
         self.signal(Signal::KILL);
         self.wait()
     }
 
     /// Presses Ctrl-C, and waits for the end that follows.
-    pub fn interrupt(self) -> Ended {
+    pub fn interrupt(self) -> CompletedProcess {
         self.signal(Signal::INT);
         self.wait().expect_code(130)
     }
@@ -181,8 +182,8 @@ impl Drop for Running {
     }
 }
 
-impl Said {
-    fn gather(stream: impl Read + Send + 'static) -> Self {
+impl CapturedOutput {
+    fn capture(stream: impl Read + Send + 'static) -> Self {
         let text = Arc::new(Mutex::new(String::new()));
         let gathered = Arc::clone(&text);
         let reader = std::thread::spawn(move || {
@@ -210,7 +211,7 @@ impl Said {
     }
 }
 
-impl Ended {
+impl CompletedProcess {
     #[track_caller]
     pub fn expect_code(self, code: i32) -> Self {
         let Self { name, stderr, signal, .. } = &self;
@@ -218,9 +219,9 @@ impl Ended {
         self
     }
 
-    /// Holds what it said against what a person must learn.
+    /// Checks that standard error contains each of `parts`.
     #[track_caller]
-    pub fn expect_said(self, parts: &[&str]) -> Self {
+    pub fn expect_stderr(self, parts: &[&str]) -> Self {
         for part in parts {
             assert!(self.stderr.contains(part), "{} does not say '{part}' but:\n{}", self.name, self.stderr);
         }
@@ -228,7 +229,7 @@ impl Ended {
     }
 
     #[track_caller]
-    pub fn expect_printed(&self, parts: &[&str]) {
+    pub fn expect_stdout(&self, parts: &[&str]) {
         for part in parts {
             let Self { name, stdout, stderr, .. } = self;
             assert!(stdout.contains(part), "{name} does not print '{part}' but:\n{stdout}\n{stderr}");
@@ -265,8 +266,8 @@ mod tests {
         let slow = start("for i in 1 2 3 4 5 6; do echo $i; sleep 0.5; done").wait_within(limit);
         assert_eq!(slow.expect_code(0).stdout.lines().count(), 6);
         let silent = || start("echo word; exec sleep 1000").wait_within(Duration::from_millis(300));
-        let said = std::panic::catch_unwind(silent).expect_err("it hangs");
-        let said = said.downcast_ref::<String>().expect("a message");
-        assert!(said.contains("sh hangs"), "{said}");
+        let panic = std::panic::catch_unwind(silent).expect_err("it hangs");
+        let message = panic.downcast_ref::<String>().expect("a message");
+        assert!(message.contains("sh hangs"), "{message}");
     }
 }

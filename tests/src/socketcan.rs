@@ -35,11 +35,11 @@ pub const DIFFERENCES_WHEN_DOWN: [(&str, &str); 4] = [
 
 /// The recorded answers, but for the differences.
 pub fn expected_answers() -> String {
-    recorded_but_for("answers.txt", &DIFFERENCES)
+    recorded_except("answers.txt", &DIFFERENCES)
 }
 
 /// A recorded output with lines that differ in the place of those on vcan.
-pub fn recorded_but_for(file: &str, differences: &[(&str, &str)]) -> String {
+pub fn recorded_except(file: &str, differences: &[(&str, &str)]) -> String {
     let recorded = fs::read_to_string(expected().join(file)).expect("a recorded output");
     let mut differences = differences.iter().peekable();
     let mut expected = String::new();

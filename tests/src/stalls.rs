@@ -15,14 +15,14 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Programs are looked for so often, in looks.
 const FIND_EVERY: u32 = 20;
 
-/// Watches until it is asked.
+/// Watches until its result is asked for.
 #[must_use]
-pub struct Stalls {
+pub struct StallWatch {
     stop: Arc<AtomicBool>,
     watcher: JoinHandle<Duration>,
 }
 
-impl Stalls {
+impl StallWatch {
     /// Of the programs with this word on their command line, which may start later.
     pub fn of(word: &str) -> Self {
         let stop = Arc::new(AtomicBool::new(false));

@@ -6,7 +6,7 @@ use std::fs::File;
 use std::path::PathBuf;
 
 /// The machine, as long as it is held.
-pub struct Turn {
+pub struct MachineLock {
     _lock: File,
 }
 
@@ -16,11 +16,11 @@ pub fn path() -> PathBuf {
 }
 
 /// Waits for the machine; it is this test's until the turn goes, or its process.
-pub fn take() -> Turn {
+pub fn take() -> MachineLock {
     let path = path();
     let made = std::fs::create_dir_all(path.parent().expect("a folder")).and_then(|()| File::create(&path));
     let lock = made.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     // Each opening of the file has a lock of its own, so that threads of one process wait for each other too.
     flock(&lock, FlockOperation::LockExclusive).unwrap_or_else(|error| panic!("turn.lock: {error}"));
-    Turn { _lock: lock }
+    MachineLock { _lock: lock }
 }

@@ -35,12 +35,12 @@ pub fn run(seconds: u32, with: bool) -> Outcome {
     }
     let (emulator, controller) = scene.start(Pace::Real, &options, "--repeat");
     let page = with.then(|| LivePage::open(&scene, ""));
-    let audience = page.as_ref().map(|page| Audience::gather(&scene, page));
+    let clients = page.as_ref().map(|page| LivePageClients::start(&scene, page));
     scene.wait_for_rows("emulator", seconds as usize * 500);
     let viewers = page.as_ref().map_or(0, |page| count(&page.state(), "/viewers"));
     emulator.wait_within(Duration::from_secs(u64::from(seconds)) + PATIENCE).expect_code(0);
     controller.wait();
-    drop(audience);
+    drop(clients);
     if let Some(page) = page {
         page.close();
     }
@@ -56,13 +56,13 @@ pub fn run(seconds: u32, with: bool) -> Outcome {
     }
 }
 
-struct Audience {
+struct LivePageClients {
     _browser: Running,
     _still: TcpStream,
 }
 
-impl Audience {
-    fn gather(scene: &Scene, page: &LivePage) -> Self {
+impl LivePageClients {
+    fn start(scene: &Scene, page: &LivePage) -> Self {
         let mut command = Command::new("chromium");
         command.args(["--headless=new", "--no-sandbox", "--disable-gpu", "--no-first-run"]);
         command.arg(format!("--user-data-dir={}", scene.path("browser").display()));

@@ -3,7 +3,7 @@
 use crate::binaries::{Program, workspace};
 use crate::foreign_python::{light_path, python};
 use crate::peer::{Packet, Peer};
-use crate::process::{Ended, PATIENCE, Running};
+use crate::process::{CompletedProcess, PATIENCE, Running};
 use crate::records::json;
 use crate::scene::Scene;
 use protocol::can::CanFrame;
@@ -28,17 +28,17 @@ pub fn command(packet: &[u8]) -> CanFrame {
     CanFrame::new(0x1E0, &bytes)
 }
 
-/// What the drive's controller says over XCP in a frame, if it is one of its.
+/// XCP packet of the drive's controller in a frame, if it is one.
 pub fn xcp_packet(frame: &CanFrame) -> Option<[u8; 8]> {
     (frame.standard_id() == Some(0x1E1)).then(|| frame.data().try_into().expect("padded to 8 bytes"))
 }
 
 /// A client of the drive's controller in real time.
-pub struct Talk<'a>(pub &'a Peer);
+pub struct XcpClient<'a>(pub &'a Peer);
 
-impl Talk<'_> {
-    /// Says a command and waits for its answer, whatever else comes meanwhile.
-    pub fn ask(&self, packet: &[u8]) -> [u8; 8] {
+impl XcpClient<'_> {
+    /// Sends a command and waits for its answer, whatever else arrives meanwhile.
+    pub fn request(&self, packet: &[u8]) -> [u8; 8] {
         self.0.send(&command(packet).to_bytes());
         loop {
             match self.0.receive(PATIENCE) {
@@ -51,62 +51,62 @@ impl Talk<'_> {
         }
     }
 
-    /// Says a command that must be answered well.
+    /// Sends a command that must be answered positively.
     #[track_caller]
-    pub fn good(&self, packet: &[u8]) -> [u8; 7] {
-        let [first, rest @ ..] = self.ask(packet);
+    pub fn request_ok(&self, packet: &[u8]) -> [u8; 7] {
+        let [first, rest @ ..] = self.request(packet);
         assert_eq!(first, 0xFF, "{packet:02X?} is refused: {rest:02X?}");
         rest
     }
 
     pub fn unlock(&self) {
-        self.good(&[0xFF, 0]);
-        let first = self.good(&[0xF8, 0, 1]);
-        let second = self.good(&[0xF8, 1, 0]);
+        self.request_ok(&[0xFF, 0]);
+        let first = self.request_ok(&[0xF8, 0, 1]);
+        let second = self.request_ok(&[0xF8, 1, 0]);
         let seed = [&first[1..7], &second[1..3]].concat().try_into().expect("8 bytes");
         let [a, b, c, d, e, f, g, h] = lock::key(&SECRET, seed);
-        self.good(&[0xF7, 8, a, b, c, d, e, f]);
-        self.good(&[0xF7, 2, g, h]);
+        self.request_ok(&[0xF7, 8, a, b, c, d, e, f]);
+        self.request_ok(&[0xF7, 2, g, h]);
     }
 
-    pub fn to(&self, address: u32) {
+    pub fn set_address(&self, address: u32) {
         let [a, b, c, d] = address.to_le_bytes();
-        self.good(&[0xF6, 0, 0, 0, a, b, c, d]);
+        self.request_ok(&[0xF6, 0, 0, 0, a, b, c, d]);
     }
 
     pub fn write(&self, address: u32, value: f64) {
         let [a, b, c, d, e, f, g, h] = value.to_le_bytes();
-        self.to(address);
-        self.good(&[0xF0, 6, a, b, c, d, e, f]);
-        self.good(&[0xF0, 2, g, h]);
+        self.set_address(address);
+        self.request_ok(&[0xF0, 6, a, b, c, d, e, f]);
+        self.request_ok(&[0xF0, 2, g, h]);
     }
 }
 
-pub struct Foreign {
+pub struct PyXcpClient {
     running: Running,
-    seen: PathBuf,
+    results: PathBuf,
 }
 
-impl Foreign {
+impl PyXcpClient {
     /// Starts a scenario of `tests/python/xcp_client.py` at the controller of `axis`, whose files are in `folder`. A `member`
     /// takes part in the lockstep barrier.
     pub fn start(scene: &Scene, scenario: &str, folder: &str, axis: &str, member: bool) -> Self {
         let scripts = workspace().join("tests/python");
-        let seen = scene.path(&format!("seen-{axis}.json"));
+        let results = scene.path(&format!("results-{axis}.json"));
         let mut command = Command::new(python());
         command.env("PYTHONPATH", light_path()).arg(scripts.join("xcp_client.py"));
-        command.arg(scenario).arg(scene.socket()).arg(scene.path(folder)).arg(axis).arg(&seen);
+        command.arg(scenario).arg(scene.socket()).arg(scene.path(folder)).arg(axis).arg(&results);
         if member {
             command.arg(format!("client-{axis}"));
         }
-        Self { running: Running::start("pyXCP", &mut command), seen }
+        Self { running: Running::start("pyXCP", &mut command), results }
     }
 
-    /// What it has seen at its end.
+    /// The results that it wrote, once it has ended.
     pub fn wait(self) -> Value {
-        let Ended { code, stderr, stdout, .. } = self.running.wait_within(PATIENCE);
+        let CompletedProcess { code, stderr, stdout, .. } = self.running.wait_within(PATIENCE);
         assert_eq!(code, Some(0), "pyXCP failed:\n{stdout}\n{stderr}");
-        json(&self.seen)
+        json(&self.results)
     }
 }
 

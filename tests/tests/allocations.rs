@@ -8,7 +8,7 @@
 use protocol::can::CanFrame;
 use rustix::process::Signal;
 use system_tests::onlooker::Viewer;
-use system_tests::xcp::{self, Talk};
+use system_tests::xcp::{self, XcpClient};
 use system_tests::{Build, LINKED, Pace, Peer, RESTLESS, Scene, both_good, count, run_both, turn};
 
 /// Faults that begin and end after the warm-up, mild enough for the run to go on as it does.
@@ -83,9 +83,9 @@ fn ten_seconds_of_both_programs_on_a_real_bus_allocate_nothing() {
 /// A client comes for a moment: the first time it unlocks and starts to measure, then it changes a gain, with and without
 /// success, triggers, reads, stores and loads.
 fn tune(peer: &Peer, row: usize) {
-    let talk = Talk(peer);
+    let client = XcpClient(peer);
     if row == 1000 {
-        talk.unlock();
+        client.unlock();
         for packet in [
             &[0xD6][..],
             &[0xD5, 0, 1, 0],
@@ -95,27 +95,27 @@ fn tune(peer: &Peer, row: usize) {
             &[0xE1, 0xFF, 4, 0, 4, 0, 0, 0x30],
             &[0xDE, 1, 0, 0],
         ] {
-            let _ = talk.good(packet);
+            let _ = client.request_ok(packet);
         }
         return;
     }
     // The gain is the seventh number of the scene's program; arming and loading are the last two controls.
     let (gain, arm) = (0x1000_0000 + 8 * 6, 0x2000_0000 + 8 * 10);
-    talk.write(gain, 30.0 + row as f64 * 1e-3);
-    talk.to(gain);
-    let _ = talk.good(&[0xF0, 6, 0, 0, 0, 0, 0, 0]);
-    assert_eq!(talk.ask(&[0xF0, 2, 0, 0x7F])[..2], [0xFE, 0x22], "too large a gain is refused");
-    talk.to(arm);
-    let _ = talk.good(&[0xF0, 4, 1, 0, 0, 0]);
-    talk.to(0x5100_0000);
-    let _ = talk.good(&[0xF5, 7]);
-    let _ = talk.good(&[0xF3, 0, 0, 0, 0, 16, 0, 0]);
+    client.write(gain, 30.0 + row as f64 * 1e-3);
+    client.set_address(gain);
+    let _ = client.request_ok(&[0xF0, 6, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(client.request(&[0xF0, 2, 0, 0x7F])[..2], [0xFE, 0x22], "too large a gain is refused");
+    client.set_address(arm);
+    let _ = client.request_ok(&[0xF0, 4, 1, 0, 0, 0]);
+    client.set_address(0x5100_0000);
+    let _ = client.request_ok(&[0xF5, 7]);
+    let _ = client.request_ok(&[0xF3, 0, 0, 0, 0, 16, 0, 0]);
     if row == 2000 {
-        let _ = talk.good(&[0xF9, 1, 0, 0]);
+        let _ = client.request_ok(&[0xF9, 1, 0, 0]);
     }
     if row == 3000 {
-        talk.to(arm + 8);
-        let _ = talk.good(&[0xF0, 4, 1, 0, 0, 0]);
+        client.set_address(arm + 8);
+        let _ = client.request_ok(&[0xF0, 4, 1, 0, 0, 0]);
     }
 }
 

@@ -8,7 +8,9 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 use system_tests::exit::{BAD_INPUT, BOUND_BROKEN, GOOD, INTERRUPTED};
 use system_tests::small_disk::SmallDisk;
-use system_tests::{Build, Ended, PATIENCE, Program, Running, executable, install, json, skip, workspace};
+use system_tests::{
+    Build, CompletedProcess, PATIENCE, Program, Running, executable, install, json, skip, workspace,
+};
 use tempfile::TempDir;
 
 /// Twelve short rehearsals in six parts.
@@ -18,11 +20,11 @@ const SMALL: &str = "title = \"small\"\nexperiment = \"step\"\nseconds = 2.5\ndr
     [[vary]]\nexperiment = \"rig.added_mass_kg\"\nlist = [0, 20]\n\
     [[vary]]\nrig = \"friction.sliding_force_n\"\nrange = [20, 34]\n";
 
-struct Place {
+struct CampaignFolder {
     folder: TempDir,
 }
 
-impl Place {
+impl CampaignFolder {
     fn new(text: &str) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         fs::write(folder.path().join("c.toml"), text).expect("a campaign file");
@@ -43,7 +45,7 @@ impl Place {
         program
     }
 
-    fn run(&self, command: &str, arguments: &[&str]) -> Ended {
+    fn run(&self, command: &str, arguments: &[&str]) -> CompletedProcess {
         Running::start("campaign", &mut self.command(command, arguments)).wait()
     }
 
@@ -67,7 +69,7 @@ fn row(text: &str, run: usize) -> BTreeMap<String, String> {
 }
 
 /// What one start did without being disturbed, for others to be compared with.
-fn undisturbed(place: &Place) -> String {
+fn undisturbed(place: &CampaignFolder) -> String {
     place.run("run", &["--out", "whole", "--jobs", "2"]).expect_code(GOOD);
     place.text("whole/runs.csv")
 }
@@ -75,7 +77,7 @@ fn undisturbed(place: &Place) -> String {
 #[test]
 fn a_row_is_what_the_runs_folder_says_to_the_bit() {
     // Long enough for the experiment to end by itself.
-    let place = Place::new(&SMALL.replace("seconds = 2.5", "seconds = 60"));
+    let place = CampaignFolder::new(&SMALL.replace("seconds = 2.5", "seconds = 60"));
     let table = undisturbed(&place);
     for run in [1, 10] {
         assert_eq!(row(&table, run)["ended"], "done");
@@ -99,7 +101,7 @@ fn a_row_is_what_the_runs_folder_says_to_the_bit() {
 
 #[test]
 fn shards_in_any_order_and_number_give_the_same_bytes() {
-    let place = Place::new(SMALL);
+    let place = CampaignFolder::new(SMALL);
     let whole = undisturbed(&place);
     assert_eq!(whole.lines().count(), 13);
     for shard in ["2/3", "0/3", "1/3"] {
@@ -110,9 +112,9 @@ fn shards_in_any_order_and_number_give_the_same_bytes() {
     let merge = |folders: &[&str]| place.run("merge", &[folders, &["--to", "merged"]].concat());
     merge(&folders).expect_code(GOOD);
     assert!(place.text("merged/runs.csv") == whole, "three shards give other bytes than one start");
-    merge(&folders[..2]).expect_code(BAD_INPUT).expect_said(&["2 of 6 parts are missing", "part 2"]);
+    merge(&folders[..2]).expect_code(BAD_INPUT).expect_stderr(&["2 of 6 parts are missing", "part 2"]);
     let doubled = [&folders[..], &["whole"]].concat();
-    merge(&doubled).expect_code(BAD_INPUT).expect_said(&["twice", "shard-0", "whole"]);
+    merge(&doubled).expect_code(BAD_INPUT).expect_stderr(&["twice", "shard-0", "whole"]);
     // An array of Slurm and an indexed job tell the index; both counts fill one folder.
     for (variable, index, count) in [("SLURM_ARRAY_TASK_ID", "0", "2"), ("JOB_COMPLETION_INDEX", "1", "2")] {
         let mut start = place.command("run", &["--out", "told", "--shard", count]);
@@ -124,7 +126,7 @@ fn shards_in_any_order_and_number_give_the_same_bytes() {
 
 #[test]
 fn a_start_that_is_killed_again_and_again_ends_with_the_same_bytes() {
-    let place = Place::new(SMALL);
+    let place = CampaignFolder::new(SMALL);
     let whole = undisturbed(&place);
     let began = Instant::now();
     let mut kills = 0;
@@ -144,17 +146,17 @@ fn a_start_that_is_killed_again_and_again_ends_with_the_same_bytes() {
 
 #[test]
 fn an_interrupted_start_says_so_and_goes_on() {
-    let place = Place::new(&SMALL.replace("draws = 3", "draws = 400"));
+    let place = CampaignFolder::new(&SMALL.replace("draws = 3", "draws = 400"));
     let mut start = Running::start("campaign", &mut place.command("run", &["--out", "out"]));
     start.wait_for("runs, ");
     start.signal(Signal::INT);
-    start.wait().expect_code(INTERRUPTED).expect_said(&["stopped", "the same command goes on"]);
+    start.wait().expect_code(INTERRUPTED).expect_stderr(&["stopped", "the same command goes on"]);
     assert!(!place.path("out/runs.csv").exists(), "there is no half table");
 }
 
 #[test]
 fn parts_that_are_not_whole_or_not_ours_are_told_and_never_merged() {
-    let place = Place::new(SMALL);
+    let place = CampaignFolder::new(SMALL);
     let whole = undisturbed(&place);
     let path = place.path("whole/parts/000002.csv");
     let good = fs::read_to_string(&path).expect("a part");
@@ -166,25 +168,27 @@ fn parts_that_are_not_whole_or_not_ours_are_told_and_never_merged() {
         (good.replacen("\n4,", "\n5,", 1), "not as it was written"),
     ] {
         fs::write(&path, bad).expect("it can be spoiled");
-        merge().expect_said(&["000002.csv", words]);
+        merge().expect_stderr(&["000002.csv", words]);
     }
     // One that cannot be read is made again; strangers are left alone.
-    place.run("run", &["--out", "whole"]).expect_code(GOOD).expect_said(&["it is made again", "; 2 to do"]);
+    place.run("run", &["--out", "whole"]).expect_code(GOOD).expect_stderr(&["it is made again", "; 2 to do"]);
     assert!(place.text("whole/runs.csv") == whole);
     fs::write(&path, good.replace("made by ", "made by 0123")).expect("it can be spoiled");
-    place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_said(&["another version"]);
+    place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_stderr(&["another version"]);
 }
 
 #[test]
 fn a_full_disk_loses_nothing_that_is_done() {
-    let place = Place::new(&SMALL.replace("draws = 3", "draws = 60"));
+    let place = CampaignFolder::new(&SMALL.replace("draws = 3", "draws = 60"));
     let Some(disk) = SmallDisk::mount(place.path("disk"), 64) else {
-        skip::tell("a_full_disk_loses_nothing_that_is_done", "mounting a tmpfs needs root");
+        skip::report("a_full_disk_loses_nothing_that_is_done", "mounting a tmpfs needs root");
         return;
     };
     let out = disk.path.join("out").display().to_string();
-    let _ =
-        place.run("run", &["--out", &out]).expect_code(BAD_INPUT).expect_said(&["make room and start again"]);
+    let _ = place
+        .run("run", &["--out", &out])
+        .expect_code(BAD_INPUT)
+        .expect_stderr(&["make room and start again"]);
     let done = place.parts("disk/out");
     assert!(done > 0, "nothing was written before the disk was full");
     // Elsewhere the same goes on from what the full disk holds.
@@ -199,7 +203,7 @@ fn a_full_disk_loses_nothing_that_is_done() {
 
 #[test]
 fn what_a_program_answers_becomes_a_table_and_a_confusion_matrix() {
-    let place = Place::new(
+    let place = CampaignFolder::new(
         "title = \"judge\"\ncommand = [\"./judge.sh\"]\ndraws = 2\n\
          [collect]\nfigures = [\"named\", \"score\"]\nconfusion = [[\"hidden\", \"named\"]]\nworst = [\"score\"]\n\
          [[vary]]\nname = \"hidden\"\nlist = [\"leak\", \"lag\", \"crash\"]\n",
@@ -220,7 +224,7 @@ fn what_a_program_answers_becomes_a_table_and_a_confusion_matrix() {
 /// An experiment with a table beside it, of which one number is varied.
 #[test]
 fn a_table_of_set_points_is_of_the_campaign_and_goes_with_a_run() {
-    let place = Place::new(
+    let place = CampaignFolder::new(
         "title = \"way\"\nexperiment = \"way.toml\"\nseconds = 3\n[collect]\nfigures = [\"position_error_dynamic_m\"]\n\
          [[vary]]\nexperiment = \"rig.added_mass_kg\"\nlist = [0, 10]\n",
     );
@@ -234,19 +238,19 @@ fn a_table_of_set_points_is_of_the_campaign_and_goes_with_a_run() {
     let error = row(&table, 1)["position_error_dynamic_m"].parse::<f64>().ok();
     assert!(error.is_some() && error == summary["position_error_dynamic_m"].as_f64(), "{table}");
     fs::write(place.path("way.csv"), "time_s,position_m\n0,0.1\n1,0.3\n2,0.15\n").expect("a table");
-    place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_said(&["another campaign"]);
+    place.run("run", &["--out", "whole"]).expect_code(BAD_INPUT).expect_stderr(&["another campaign"]);
 }
 
 #[test]
 fn every_shipped_campaign_is_one_and_faults_run_as_processes() {
     for entry in fs::read_dir(workspace().join("campaign/campaigns")).expect("campaigns").flatten() {
-        let place = Place::new(&fs::read_to_string(entry.path()).expect("a campaign"));
+        let place = CampaignFolder::new(&fs::read_to_string(entry.path()).expect("a campaign"));
         let ended = place.run("plan", &["--json"]).expect_code(GOOD);
         let plan: serde_json::Value = serde_json::from_str(&ended.stdout).expect("a plan");
         assert!(plan["runs"].as_u64().is_some_and(|runs| runs > 10), "{}", entry.path().display());
     }
     let faults = fs::read_to_string(workspace().join("campaign/campaigns/faults.toml")).expect("the faults");
-    let place = Place::new(&faults.replace("draws = 4", "draws = 1\nruns_per_part = 3"));
+    let place = CampaignFolder::new(&faults.replace("draws = 4", "draws = 1\nruns_per_part = 3"));
     place.run("run", &["--out", "out"]).expect_code(GOOD);
     let table = place.text("out/runs.csv");
     let errors: Vec<f64> =
@@ -257,7 +261,7 @@ fn every_shipped_campaign_is_one_and_faults_run_as_processes() {
 
 #[test]
 fn the_page_is_whole_and_asks_for_nothing_from_elsewhere() {
-    let place = Place::new(SMALL);
+    let place = CampaignFolder::new(SMALL);
     undisturbed(&place);
     let page = place.text("whole/report.html");
     let document = roxmltree::Document::parse_with_options(
@@ -279,7 +283,7 @@ fn the_page_is_whole_and_asks_for_nothing_from_elsewhere() {
 /// A Dask cluster of two workers on this machine, one of which is killed while both are at work.
 #[test]
 fn dask_gives_the_same_bytes_when_a_worker_is_killed() {
-    let place = Place::new(&SMALL.replace("draws = 3", "draws = 16"));
+    let place = CampaignFolder::new(&SMALL.replace("draws = 3", "draws = 16"));
     let whole = undisturbed(&place);
     let python = system_tests::foreign_python::of("dask");
     let mut command = Command::new(python);

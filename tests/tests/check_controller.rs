@@ -8,7 +8,9 @@ use protocol::checksum;
 use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, ValveCommand};
 use std::collections::BTreeMap;
 use std::path::Path;
-use system_tests::{Build, Ended, Peer, Program, Running, SHORT, Scene, executable, firmware, turn};
+use system_tests::{
+    Build, CompletedProcess, Peer, Program, Running, SHORT, Scene, executable, firmware, turn,
+};
 
 /// The check on the scene's bus; what follows `--` is the controller's command line.
 fn check(scene: &Scene, options: &str, controller: &[&str]) -> Running {
@@ -22,7 +24,7 @@ fn check(scene: &Scene, options: &str, controller: &[&str]) -> Running {
 }
 
 /// How each check ended, by class and name, from the file that CI systems read.
-fn results(scene: &Scene, ended: &Ended) -> BTreeMap<String, &'static str> {
+fn results(scene: &Scene, ended: &CompletedProcess) -> BTreeMap<String, &'static str> {
     let text = std::fs::read_to_string(scene.path("junit.xml"))
         .unwrap_or_else(|error| panic!("no result: {error}\n{}\n{}", ended.stdout, ended.stderr));
     let document = roxmltree::Document::parse(&text).expect("XML");
@@ -119,7 +121,7 @@ enum Fault {
 }
 
 /// A controller that holds its valve open and breaks the contract in one place.
-struct Breaking {
+struct FaultyController {
     fault: Fault,
     alive: u8,
     stopped_since: Option<u32>,
@@ -128,7 +130,7 @@ struct Breaking {
     last: Option<u16>,
 }
 
-impl Breaking {
+impl FaultyController {
     fn new(fault: Fault) -> Self {
         Self { fault, alive: 0, stopped_since: None, answered: 0, silent_cycles: 0, last: None }
     }
@@ -158,7 +160,7 @@ impl Breaking {
         };
         if self.silent_cycles == 50 {
             let stop = EmergencyStop { reason: EmergencyStopReason::SensorLoss, release: false };
-            peer.say(&Frame::DriveEmergencyStop(stop));
+            peer.send_frame(&Frame::DriveEmergencyStop(stop));
         }
         if answers {
             self.answer(peer, cycle);
@@ -214,7 +216,7 @@ impl Breaking {
 }
 
 /// What the check says of a controller with this fault, when it starts this command beside it: the failed ones, and all.
-fn broken(fault: Fault, command: &[&str]) -> (Vec<String>, Ended) {
+fn broken(fault: Fault, command: &[&str]) -> (Vec<String>, CompletedProcess) {
     let scene = Scene::new(SHORT);
     let running = check(&scene, "--pace lockstep --seconds 1", command);
     std::thread::scope(|scope| {
@@ -229,7 +231,7 @@ fn broken(fault: Fault, command: &[&str]) -> (Vec<String>, Ended) {
 /// Three times a controller that was reset.
 fn three_sessions(socket: &Path, fault: Fault) {
     for _ in 0..3 {
-        let mut controller = Breaking::new(fault);
+        let mut controller = FaultyController::new(fault);
         let onlooker = Peer::connect(socket);
         Peer::connect(socket)
             .take_part("controller", |peer, cycle, frames| controller.act(peer, cycle, frames));
@@ -289,8 +291,8 @@ fn a_controller_that_is_not_there_or_never_moves_is_told_so() {
     assert_eq!(that(&results(&scene, &ended), "passed"), [""; 0]);
     assert!(ended.stdout.contains("nothing came in 200 cycles"), "{}", ended.stdout);
     let nobody = check(&scene, "--pace real", &["/no/such/program"]).wait().expect_code(2);
-    nobody.expect_said(&["'/no/such/program' does not start"]);
+    nobody.expect_stderr(&["'/no/such/program' does not start"]);
     let _host = scene.bus_host("");
     let taken = check(&scene, "--pace real", &["true"]).wait().expect_code(3);
-    taken.expect_said(&["has a host already", "end the emulator on this bus first"]);
+    taken.expect_stderr(&["has a host already", "end the emulator on this bus first"]);
 }

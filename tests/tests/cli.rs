@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use system_tests::exit::{BAD_INPUT, BUS_FAILED};
-use system_tests::{Ended, Launch, PROGRAM, Pace, Program, Running, SHORT, Scene};
+use system_tests::{CompletedProcess, Launch, PROGRAM, Pace, Program, Running, SHORT, Scene};
 
 /// A key of the rig file made wrong: text, its replacement, and what the message must hold besides file and line.
 const WRONG_RIGS: [(&str, &str, &[&str]); 7] = [
@@ -25,8 +25,8 @@ fn both(scene: &Scene) -> [Launch; 2] {
 
 /// Runs to the end, which must come with this code, these words, and no trace in the output folder.
 #[track_caller]
-fn refused(scene: &Scene, launch: &Launch, code: i32, words: &[&str]) -> Ended {
-    let ended = launch.start().wait().expect_code(code).expect_said(words);
+fn refused(scene: &Scene, launch: &Launch, code: i32, words: &[&str]) -> CompletedProcess {
+    let ended = launch.start().wait().expect_code(code).expect_stderr(words);
     for report in ["emulator/summary.json", "controller/controller.json"] {
         assert!(!scene.path(report).exists(), "{report} tells of a run that never was");
     }
@@ -181,7 +181,7 @@ fn a_controller_without_a_rig_gives_up_after_its_grace_and_says_what_to_start() 
     let scene = Scene::new(SHORT);
     for pace in [Pace::Real, Pace::Lockstep] {
         let controller = scene.controller(pace).with("--bus-grace 0.3").start();
-        controller.wait().expect_code(BUS_FAILED).expect_said(&["emulator run", "--bus-grace"]);
+        controller.wait().expect_code(BUS_FAILED).expect_stderr(&["emulator run", "--bus-grace"]);
     }
 }
 
@@ -207,7 +207,7 @@ fn a_wrong_command_line_tells_what_is_allowed() {
     for (program, (line, hint)) in cases.chain(controller.map(|case| (Program::Controller, case))) {
         let name = format!("{} {line}", program.name());
         let ended = Running::start(&name, program.command().args(line.split(' '))).wait();
-        ended.expect_code(BAD_INPUT).expect_said(&[hint]);
+        ended.expect_code(BAD_INPUT).expect_stderr(&[hint]);
     }
 }
 
@@ -216,6 +216,6 @@ fn help_tells_the_exit_codes_in_one_table() {
     for program in [Program::Emulator, Program::Controller] {
         let ended = program.start(&[&"--help"]).wait().expect_code(0);
         let parts = ["0 good", "1 a bound", "2 usage", "3 the bus", "4 lockstep", "130 interrupted"];
-        ended.expect_printed(&parts);
+        ended.expect_stdout(&parts);
     }
 }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use system_tests::discrepancy::{discrepancy, rig};
 use system_tests::exit::{BAD_INPUT, GOOD, INTERRUPTED};
-use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, find, json};
+use system_tests::{CompletedProcess, Pace, Program, Running, SHORT, Scene, find, json};
 use tempfile::TempDir;
 
 /// A constant force: some 14 degrees at 5 kg.
@@ -45,7 +45,7 @@ static RECORDS: LazyLock<Records> = LazyLock::new(|| {
     Records { folder, train, test }
 });
 
-fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> Ended {
+fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> CompletedProcess {
     let rig = rig();
     let mut all: Vec<&dyn AsRef<OsStr>> = vec![&step, &"--rig", &rig, &"--train", &record];
     all.extend([&"--out" as &dyn AsRef<OsStr>, &out]);
@@ -175,7 +175,7 @@ fn the_steps_after_a_report(closed: &Path) {
     let confirmed = json(&report)["verification"]["confirmed"].as_bool().expect("a verification");
     let verified = verified.expect_code(i32::from(!confirmed));
     let parts = ["drive_position_m: before", "chi2", if confirmed { ": confirmed" } else { "not confirmed" }];
-    verified.expect_printed(&parts);
+    verified.expect_stdout(&parts);
     let alone = json(&out.join("verification.json"));
     for field in ["gap", "verification"] {
         assert_eq!(alone[field], json(&report)[field], "{field} of verify alone is that of close");
@@ -194,7 +194,7 @@ fn the_steps_before_a_report_run_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let train = &RECORDS.train;
     let check = on("check", train, folder.path(), &[]).expect_code(GOOD);
-    check.expect_printed(&["8000 rows", "can be used", "drive_force_N: noise 0.5"]);
+    check.expect_stdout(&["8000 rows", "can be used", "drive_force_N: noise 0.5"]);
     assert_eq!(json(&folder.path().join("checks.json"))[0]["usable"], true);
 
     let calibrate = on("calibrate", train, folder.path(), &[]).expect_code(GOOD);
@@ -281,7 +281,7 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
         let own = find(&report["checks"][0]["findings"], "kind", kind);
         assert_eq!(own["fatal"], true);
         let line = own["line"].as_u64().unwrap_or_else(|| panic!("no line in {own}"));
-        ended.expect_printed(&[reported, &format!("{}:{line}: ", record.display())]);
+        ended.expect_stdout(&[reported, &format!("{}:{line}: ", record.display())]);
         assert!(folder.path().join("report.html").exists());
         assert!(!folder.path().join("rig.toml").exists(), "a model out of a record that cannot be used");
         // The steps alone refuse it too, with the same words.
@@ -302,10 +302,10 @@ fn what_is_read_is_never_written_over_and_no_record_is_both_trained_on_and_held_
         all.extend(more);
         discrepancy(&all).expect_code(BAD_INPUT)
     };
-    close(&[]).expect_said(&["rig.toml", "would be written over", "another --out"]);
+    close(&[]).expect_stderr(&["rig.toml", "would be written over", "another --out"]);
     assert_eq!(fs::read(&own).expect("the rig file"), fs::read(rig()).expect("the rig file"));
-    close(&[&train]).expect_said(&["--train", "given twice"]);
-    close(&[&"--test", &train]).expect_said(&["--test", "a training record as well"]);
+    close(&[&train]).expect_stderr(&["--train", "given twice"]);
+    close(&[&"--test", &train]).expect_stderr(&["--test", "a training record as well"]);
     assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "only the rig file");
 }
 
@@ -322,7 +322,7 @@ fn an_earlier_result_does_not_stay_beside_bad_data_and_an_interrupted_run_leaves
     let text = fs::read_to_string(&RECORDS.train).expect("the record");
     fs::write(&record, text.replace("drive_pressure_b_Pa", "drive_presure_b_Pa")).expect("room");
     let check = on("check", &record, &out, &[]).expect_code(BAD_INPUT);
-    check.expect_printed(&["cannot be used", "column drive_presure_b_Pa", "no column drive_pressure_b_Pa"]);
+    check.expect_stdout(&["cannot be used", "column drive_presure_b_Pa", "no column drive_pressure_b_Pa"]);
     on("close", &record, &out, &[]).expect_code(BAD_INPUT);
     assert_eq!(json(&out.join("report.json"))["verdict"], "bad-data");
     assert!(!out.join("rig.toml").exists() && !out.join("next-chirps.toml").exists());
@@ -364,7 +364,7 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
     ] {
         for step in ["close", "check", "calibrate", "locate", "name"] {
             let ended = on(step, record, &path("out"), &[]).expect_code(BAD_INPUT);
-            ended.expect_said(words);
+            ended.expect_stderr(words);
         }
     }
     on("close", &headless, &path("out"), &[]).expect_code(BAD_INPUT);
@@ -374,11 +374,11 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
     let began = std::time::Instant::now();
     on("close", train, &path("out"), &["--test", nowhere])
         .expect_code(BAD_INPUT)
-        .expect_said(&["nowhere.csv"]);
+        .expect_stderr(&["nowhere.csv"]);
     assert!(began.elapsed().as_secs_f64() < 2.0, "a missing --test is told after {:?}", began.elapsed());
     on("close", train, &path("out"), &["--without", "no-such-effect"])
         .expect_code(BAD_INPUT)
-        .expect_said(&["no-such-effect", "inclination"]);
+        .expect_stderr(&["no-such-effect", "inclination"]);
 
     let text = fs::read_to_string(rig()).expect("the rig file");
     let wrong = write("wrong.toml", &text.replacen("pressure_bar = 7.0", "pressure_bar = 70.0", 1));
@@ -392,14 +392,14 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
         let step =
             |step: &str| discrepancy(&[&step, &"--rig", &model, &"--train", &train, &"--out", &path("out")]);
         for name in ["close", "check", "locate"] {
-            step(name).expect_code(BAD_INPUT).expect_said(words);
+            step(name).expect_code(BAD_INPUT).expect_stderr(words);
         }
     }
     let no_report = write("report.json", "{}");
     for step in ["extend", "next"] {
         let ended =
             discrepancy(&[&step, &"--rig", &rig(), &"--report", &no_report, &"--out", &path("x.toml")]);
-        ended.expect_code(BAD_INPUT).expect_said(&["report.json", "named"]);
+        ended.expect_code(BAD_INPUT).expect_stderr(&["report.json", "named"]);
     }
 }
 
@@ -407,7 +407,7 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
 fn help_tells_every_step_every_option_and_the_exit_codes() {
     let whole = discrepancy(&[&"--help"]).expect_code(GOOD);
     let parts = ["close", "check", "calibrate", "locate", "name", "extend", "verify", "next", "Exit codes"];
-    whole.expect_printed(&parts);
+    whole.expect_stdout(&parts);
     for (step, parts) in [
         ("close", &["--rig", "--train", "--test", "--out", "--mapping", "--without", "--threads"][..]),
         ("close", &["this folder: discrepancy-results"]),
@@ -416,8 +416,8 @@ fn help_tells_every_step_every_option_and_the_exit_codes() {
         ("next", &["--rig", "--report", "--out"]),
     ] {
         let help = discrepancy(&[&step, &"--help"]).expect_code(GOOD);
-        help.expect_printed(parts);
+        help.expect_stdout(parts);
     }
-    discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_said(&["--rig", "--train"]);
+    discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_stderr(&["--rig", "--train"]);
     assert!(RECORDS.folder.path().exists());
 }

@@ -30,9 +30,9 @@ fn steps_alone_refuse_records_that_do_not_go_together() {
     let [train, other] = &[Axis::Drive, Axis::Load].map(of_axis);
     for step in ["calibrate", "locate"] {
         let twice = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", train];
-        discrepancy(&twice).expect_code(BAD_INPUT).expect_said(&["--train", "given twice"]);
+        discrepancy(&twice).expect_code(BAD_INPUT).expect_stderr(&["--train", "given twice"]);
         let mixed = [&step as &dyn AsRef<OsStr>, &"--rig", &rig(), &"--train", train, &"--train", other];
-        discrepancy(&mixed).expect_code(BAD_INPUT).expect_said(&["load", "the same axes"]);
+        discrepancy(&mixed).expect_code(BAD_INPUT).expect_stderr(&["load", "the same axes"]);
     }
     // Of the held-out record nothing is reported where it shows another axis.
     let out = folder.path().join("closed");
@@ -63,7 +63,7 @@ fn next_writes_an_experiment_that_tells_apart_what_a_report_could_not() {
     let next =
         discrepancy(&[&"next", &"--rig", &rig(), &"--report", &report, &"--out", &out]).expect_code(GOOD);
     let parts = ["command-dead-time drive and valve-dead-zone drive", "is expected to separate them"];
-    next.expect_printed(&parts);
+    next.expect_stdout(&parts);
     let experiment = fs::read_to_string(&out).expect("an experiment file");
     assert!(experiment.contains("[run]") && experiment.starts_with("# Proposed by"), "{experiment}");
 }

@@ -12,7 +12,7 @@ const OF_THE_MACHINE: [&str; 4] = ["cpu-contention", "machine-stood-still", "une
 #[track_caller]
 fn is_named(disturbance: Disturbance) {
     if disturbance.needs_root() && !rustix::process::geteuid().is_root() {
-        return skip::tell(&format!("{}_is_named", disturbance.name()), "needs root");
+        return skip::report(&format!("{}_is_named", disturbance.name()), "needs root");
     }
     let _machine = turn::take();
     let named = disturb::run(disturbance, Duration::from_millis(700));

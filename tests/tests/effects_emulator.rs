@@ -9,7 +9,7 @@ use plant::effects::sheet::Switched;
 use std::sync::Mutex;
 use std::thread;
 use system_tests::hidden::{
-    Extreme, LIVELY, Live, drawn, each_alone, everything, expect_physical, live, rig_with,
+    Extreme, LIVELY, LoopTiming, drawn, each_alone, everything, expect_physical, live, rig_with,
 };
 use system_tests::{Pace, Scene, Table, run_both, turn};
 
@@ -62,8 +62,8 @@ fn ten_effects_at_random_and_all_at_their_extremes_leave_the_rig_finite_in_locks
 }
 
 /// Slices with and without effects in turns, so that what disturbs the machine disturbs both; the sums of each.
-fn in_turns(effects: &[Switched]) -> [Live; 2] {
-    let mut sums = [Live::default(); 2];
+fn in_turns(effects: &[Switched]) -> [LoopTiming; 2] {
+    let mut sums = [LoopTiming::default(); 2];
     for _ in 0..ROUNDS {
         for (sum, effects) in sums.iter_mut().zip([&[][..], effects]) {
             let scene = Scene::new(LIVELY);
@@ -84,9 +84,9 @@ fn in_turns(effects: &[Switched]) -> [Live; 2] {
 /// while no other thread had its CPU, and with effects there may be one in a hundred cycles more than without: a machine
 /// that stands still so often cannot be measured, and effects that are too slow reach far more.
 #[track_caller]
-fn expect_no_cycle_missed_for_them([without, with]: [Live; 2]) {
+fn expect_no_cycle_missed_for_them([without, with]: [LoopTiming; 2]) {
     let (cycles, allowed) = (with.cycles, without.overworked + with.cycles / 100);
-    let Live { overworked, missed, .. } = with;
+    let LoopTiming { overworked, missed, .. } = with;
     assert!(
         overworked <= allowed,
         "{overworked} of {cycles} cycles outlasted their period by themselves ({missed} were missed), {} ({}) without effects",

@@ -57,7 +57,7 @@ fn the_controllers_end_an_aborted_experiment_by_themselves() {
     let scene = Scene::new(RESTLESS);
     let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2 --seconds 10", "--repeat");
     scene.peer().be_console(|cycle| (cycle == TRIP).then(|| Frame::ConsoleEmergencyStop(stop(false))));
-    controller.wait().expect_code(BOUND_BROKEN).expect_said(&["aborted", "emergency stop"]);
+    controller.wait().expect_code(BOUND_BROKEN).expect_stderr(&["aborted", "emergency stop"]);
     emulator.wait();
     let report = scene.report();
     assert_eq!(report["axes"]["drive"]["chain_state"], "aborted");

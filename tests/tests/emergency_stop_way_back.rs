@@ -7,7 +7,9 @@ use protocol::frames::{EmergencyStop, EmergencyStopReason, Frame, RunControl, Ru
 use rustix::process::Signal;
 use serde_json::Value;
 use system_tests::bus_cycles::by_cycle;
-use system_tests::{AxisTable, Ended, LINKED, Pace, Program, Scene, Table, bus_log, json, own, turn};
+use system_tests::{
+    AxisTable, CompletedProcess, LINKED, Pace, Program, Scene, Table, bus_log, json, own, turn,
+};
 
 /// 0.3 m in 0.5 s: 1.2 m/s at its fastest, which the valve gives for a moment only.
 const FAST: &str = include_str!("../scenes/fast.toml");
@@ -22,7 +24,7 @@ const CHAMBERS: [&str; 4] =
 const RESTART_M_PER_MS: f64 = 0.3e-3;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum By {
+enum StopSource {
     Bus,
     /// The script at the rig's own button.
     Rig,
@@ -35,7 +37,7 @@ fn stop(release: bool) -> Frame {
 }
 
 /// Runs with a console that says something in some cycles, everything into one folder. Returns how the controller ended.
-fn run(scene: &Scene, mut say: impl FnMut(usize) -> Option<Frame>) -> Ended {
+fn run(scene: &Scene, mut say: impl FnMut(usize) -> Option<Frame>) -> CompletedProcess {
     let out = scene.path("run");
     let options = "--members 2 --seconds 30";
     let emulator = scene.emulator(Pace::Lockstep).out(&out).with(options).start();
@@ -45,16 +47,17 @@ fn run(scene: &Scene, mut say: impl FnMut(usize) -> Option<Frame>) -> Ended {
     controller.wait()
 }
 
-fn tripped(by: By) -> Scene {
+fn tripped(source: StopSource) -> Scene {
     let script = format!("[[rig.event]]\nat_s = {}\ndo = \"emergency-stop\"\n", TRIP as f64 * 1e-3);
-    let scene = Scene::new(&if by == By::Rig { format!("{FAST}{script}") } else { FAST.into() });
-    if by == By::Controller {
+    let scene = Scene::new(&if source == StopSource::Rig { format!("{FAST}{script}") } else { FAST.into() });
+    if source == StopSource::Controller {
         own::failing(&scene, "count > 200 && ready->set_position_m > 0.28", &[]);
         scene.write("program.toml", own::PROGRAM);
     }
-    let ended = run(&scene, |cycle| (by == By::Bus && cycle == TRIP).then(|| stop(false)));
-    let cause = if by == By::Controller { "controller-fault" } else { "the emergency stop is tripped" };
-    ended.expect_code(1).expect_said(&["stopped before the end: drive", cause]);
+    let ended = run(&scene, |cycle| (source == StopSource::Bus && cycle == TRIP).then(|| stop(false)));
+    let cause =
+        if source == StopSource::Controller { "controller-fault" } else { "the emergency stop is tripped" };
+    ended.expect_code(1).expect_stderr(&["stopped before the end: drive", cause]);
     scene
 }
 
@@ -70,48 +73,48 @@ fn first(column: &[f64], from: usize, what: impl Fn(f64) -> bool) -> usize {
 
 #[test]
 fn at_full_speed_the_carriage_stands_in_time_and_the_air_stays_in_the_chambers_whoever_trips() {
-    for by in [By::Bus, By::Rig, By::Controller] {
-        let scene = tripped(by);
+    for source in [StopSource::Bus, StopSource::Rig, StopSource::Controller] {
+        let scene = tripped(source);
         let truth = Table::read(&scene.path("run/truth.csv"));
         let supply = truth.column("supply_pressure_Pa");
         let velocity = truth.column("drive_rod_velocity_m_per_s");
         let position = truth.column("drive_position_m");
         let fell = first(&supply, 0, |pressure| pressure < 700_000.0);
         let trip = fell - 1;
-        assert!((TRIP - 60..TRIP + 60).contains(&trip), "{by:?}: tripped in cycle {trip}");
-        assert!(velocity[trip] > 0.5, "{by:?}: {} m/s is no full speed", velocity[trip]);
+        assert!((TRIP - 60..TRIP + 60).contains(&trip), "{source:?}: tripped in cycle {trip}");
+        assert!(velocity[trip] > 0.5, "{source:?}: {} m/s is no full speed", velocity[trip]);
         let slow = |from: &usize| velocity[*from..*from + 100].iter().all(|speed| speed.abs() < 1e-3);
         let rest = (trip..velocity.len() - 100).find(slow).expect("it comes to rest");
         let way_m = position[rest] - position[trip];
         eprintln!(
-            "{by:?}: at {:.2} m/s, {} ms and {:.1} mm to standstill",
+            "{source:?}: at {:.2} m/s, {} ms and {:.1} mm to standstill",
             velocity[trip],
             rest - trip,
             way_m * 1e3
         );
         // Viscous friction of 1.1 kN s/m against trapped air of some 6 kN/m: 0.2 s, seven times that from 0.7 m/s to 1 mm/s, and
         // b v / k of way at most, which the stroke leaves.
-        assert!(rest - trip < 2000, "{by:?}: {} ms", rest - trip);
-        assert!(way_m > 0.0 && way_m < 0.2, "{by:?}: {way_m} m");
+        assert!(rest - trip < 2000, "{source:?}: {} ms", rest - trip);
+        assert!(way_m > 0.0 && way_m < 0.2, "{source:?}: {way_m} m");
 
         let shut = truth.column("check_valves_shut");
         let shut_from = first(&shut, trip, |shut| shut != 0.0);
         // Discharge with 0.05 s: 7 bar fall below 2.5 bar after 70 ms.
-        assert!((65..76).contains(&(shut_from - trip)), "{by:?}: shut after {} ms", shut_from - trip);
-        assert!(shut[shut_from..].iter().all(|shut| *shut == 1.0), "{by:?}: and stay shut");
+        assert!((65..76).contains(&(shut_from - trip)), "{source:?}: shut after {} ms", shut_from - trip);
+        assert!(shut[shut_from..].iter().all(|shut| *shut == 1.0), "{source:?}: and stay shut");
         assert!(shut.len() - shut_from > 1000);
         for chamber in CHAMBERS {
             let air = &truth.column(chamber)[shut_from..];
             let change = air.iter().map(|stored| (stored / air[0] - 1.0).abs()).fold(0.0, f64::max);
-            assert!(change < 1e-9, "{by:?}: {chamber} changes by {change} of its air");
+            assert!(change < 1e-9, "{source:?}: {chamber} changes by {change} of its air");
         }
         let summary = figures(&scene);
         let figure = |name: &str| {
-            summary["figures"][name].as_f64().unwrap_or_else(|| panic!("{by:?}: no {name}: {summary:#}"))
+            summary["figures"][name].as_f64().unwrap_or_else(|| panic!("{source:?}: no {name}: {summary:#}"))
         };
-        assert!((figure("stop_time_s") - (rest - trip) as f64 * 1e-3).abs() < 2.5e-3, "{by:?}");
-        assert!((figure("stop_way_m") - way_m).abs() < 1e-3, "{by:?}");
-        assert!(figure("air_mass_change_while_shut_ratio") < 1e-9, "{by:?}");
+        assert!((figure("stop_time_s") - (rest - trip) as f64 * 1e-3).abs() < 2.5e-3, "{source:?}");
+        assert!((figure("stop_way_m") - way_m).abs() < 1e-3, "{source:?}");
+        assert!(figure("air_mass_change_while_shut_ratio") < 1e-9, "{source:?}");
     }
 }
 
@@ -228,7 +231,7 @@ fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release
     load.signal(Signal::CONT);
     // The load has heard of it, and tripped is left after 1 s at the latest.
     scene.wait_for_more_rows("emulator", 1500);
-    scene.peer().say(&stop(true));
+    scene.peer().send_frame(&stop(true));
     for controller in [drive, load] {
         controller.wait().expect_code(0);
     }
@@ -247,7 +250,7 @@ fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release
 fn nobody_is_told_to_start_while_the_stop_is_held() {
     let scene = Scene::new(&FAST.replace("\"end\"", "\"restart\""));
     let held = run(&scene, |cycle| (cycle == TRIP).then(|| stop(false)));
-    held.expect_code(1).expect_said(&["drive: the emergency stop is tripped"]);
+    held.expect_code(1).expect_stderr(&["drive: the emergency stop is tripped"]);
     let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
     assert_eq!(drive.states("emergency_stop_chain").last(), Some(&"waiting-for-release"));
     assert!(drive.numbers("enabled")[TRIP + 2..].iter().all(|enabled| *enabled == 0.0), "shut for 29 s");

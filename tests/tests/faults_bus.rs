@@ -53,7 +53,7 @@ fn controllers_that_know_of_each_other_take_a_second_one_for_a_fault_and_stop() 
     let scene = Scene::new(RESTLESS);
     let (emulator, first) = scene.under_way(Pace::Real, UNDER_WAY);
     let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
-    first.wait().expect_code(1).expect_said(&["partner-restarted", "began anew in the middle"]);
+    first.wait().expect_code(1).expect_stderr(&["partner-restarted", "began anew in the middle"]);
     second.wait().expect_code(1);
     emulator.interrupt();
     let reported = events::all(&scene.summary());
@@ -120,8 +120,8 @@ fn a_bus_that_stays_away_ends_both_with_complete_files() {
     scene.wait_for_rows("emulator", UNDER_WAY);
     host.kill();
     emulator.wait_for("the bus is gone");
-    emulator.wait().expect_code(3).expect_said(&["--bus-grace"]);
-    controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    emulator.wait().expect_code(3).expect_stderr(&["--bus-grace"]);
+    controller.wait().expect_code(3).expect_stderr(&["--bus-grace"]);
     let summary = scene.summary();
     let measurement = scene.measurement();
     assert_eq!(count(&summary, "/cycles"), measurement.len() as u64);
@@ -155,7 +155,7 @@ fn a_rig_that_was_killed_is_missed_while_others_still_talk() {
         }
     });
     controller.wait_for("no sensors for 0.2 s");
-    controller.wait().expect_code(3).expect_said(&["--bus-grace"]);
+    controller.wait().expect_code(3).expect_stderr(&["--bus-grace"]);
     over.store(true, Ordering::Relaxed);
     chatter.join().expect("the stranger talked to the end");
     drop(host);
@@ -211,12 +211,14 @@ fn a_second_host_is_refused_and_a_second_rig_leaves_while_the_first_goes_on() {
     // Long enough on the bus to know that it was here first.
     scene.wait_for_rows("emulator", 500);
     let host = scene.start_bus_host("");
-    host.wait().expect_code(3).expect_said(&["has a host already", "connect to it, or choose another path"]);
+    host.wait()
+        .expect_code(3)
+        .expect_stderr(&["has a host already", "connect to it, or choose another path"]);
     let second = scene.emulator(Pace::Real).out(&scene.path("second")).start();
     second
         .wait()
         .expect_code(3)
-        .expect_said(&["has a host already; joining it", "another rig is on this bus already"]);
+        .expect_stderr(&["has a host already; joining it", "another rig is on this bus already"]);
     first.wait_for("another rig is on this bus; stop one of them");
     first.interrupt();
     assert!(json(&scene.path("second/summary.json"))["bus_host"].is_null());

@@ -17,7 +17,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
     emulator
         .wait()
         .expect_code(LOCKSTEP_TIMEOUT)
-        .expect_said(&["lockstep: 'controller' was not done within 5 s of wall time"]);
+        .expect_stderr(&["lockstep: 'controller' was not done within 5 s of wall time"]);
     expect_complete(&scene);
     controller.signal(Signal::CONT);
     let code = controller.wait().code;
@@ -29,7 +29,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
 fn a_barrier_that_nobody_joins_is_given_up() {
     let scene = Scene::new(SHORT);
     let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 0.3").start();
-    emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined", "--members"]);
+    emulator.wait().expect_code(BUS_FAILED).expect_stderr(&["not all members joined", "--members"]);
     assert_eq!(count(&scene.summary(), "/cycles"), 0);
 }
 
@@ -37,7 +37,7 @@ fn a_barrier_that_nobody_joins_is_given_up() {
 fn a_barrier_that_one_of_two_joins_is_given_up_and_the_one_ends_too() {
     let scene = Scene::new(SHORT);
     let (emulator, controller) = scene.start(Pace::Lockstep, "--members 2 --join-timeout 0.5", "");
-    emulator.wait().expect_code(BUS_FAILED).expect_said(&["not all members joined"]);
+    emulator.wait().expect_code(BUS_FAILED).expect_stderr(&["not all members joined"]);
     controller.wait().expect_code(BUS_FAILED);
 }
 
@@ -46,7 +46,7 @@ fn a_member_that_is_killed_ends_the_run_and_what_was_recorded_stays() {
     let scene = Scene::new(RESTLESS);
     let (emulator, controller) = scene.under_way(Pace::Lockstep, 600);
     controller.kill();
-    emulator.wait().expect_code(BUS_FAILED).expect_said(&["all members left the barrier"]);
+    emulator.wait().expect_code(BUS_FAILED).expect_stderr(&["all members left the barrier"]);
     expect_complete(&scene);
 }
 

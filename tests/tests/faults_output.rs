@@ -4,16 +4,16 @@ use std::path::Path;
 use system_tests::exit::BAD_INPUT;
 use system_tests::small_disk::SmallDisk;
 use system_tests::{
-    Ended, Pace, RESTLESS, Scene, Table, bus_log_to_last_whole_line, count, expect_whole_lines, json, skip,
-    turn,
+    CompletedProcess, Pace, RESTLESS, Scene, Table, bus_log_to_last_whole_line, count, expect_whole_lines,
+    json, skip, turn,
 };
 
 /// No file grows beyond some hundred KiB; the signal that comes with it is ignored, so that writing fails instead.
 const SMALL_FILES: &str = "trap '' XFSZ && ulimit -f 300";
 
-fn expect_told(ended: Ended, folder: &Path) {
+fn expect_told(ended: CompletedProcess, folder: &Path) {
     let folder = folder.display().to_string();
-    ended.expect_code(BAD_INPUT).expect_said(&["cannot write", &folder, "free space", "--out"]);
+    ended.expect_code(BAD_INPUT).expect_stderr(&["cannot write", &folder, "free space", "--out"]);
 }
 
 /// A batch of lines that the disk took in part was left as it was, so that measurement.csv ended in half a row and the
@@ -54,7 +54,7 @@ fn a_full_disk_ends_the_run_and_keeps_whole_lines() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let Some(disk) = SmallDisk::mount(scene.path("disk"), 512) else {
-        skip::tell("a_full_disk_ends_the_run_and_keeps_whole_lines", "mounting a tmpfs needs root");
+        skip::report("a_full_disk_ends_the_run_and_keeps_whole_lines", "mounting a tmpfs needs root");
         return;
     };
     let folder = disk.path.join("run");

@@ -28,8 +28,8 @@ fn a_user_without_privileges_is_told_the_remedy_and_the_run_succeeds() {
     let (emulator, controller) = (emulator.start(), controller.start());
     let remedies =
         ["warning: no FIFO priority", "setcap cap_sys_nice+ep", "warning: no locked memory", "limits.d"];
-    emulator.wait().expect_code(0).expect_said(&remedies);
-    let controller = controller.wait().expect_said(&remedies);
+    emulator.wait().expect_code(0).expect_stderr(&remedies);
+    let controller = controller.wait().expect_stderr(&remedies);
     if controller.code != Some(0) {
         let report = std::fs::read_to_string(scene.path("controller/controller.json")).expect("a report");
         let is_late = LATENESS.iter().any(|words| report.contains(words));

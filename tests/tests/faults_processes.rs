@@ -59,7 +59,7 @@ fn an_emulator_that_is_killed_and_restarted_is_found_again_and_the_chain_starts_
     controller.wait_for("the bus is gone");
     let second = scene.emulator(Pace::Real).out(&scene.path("second")).start();
     controller.wait_for("the rig started anew; starting over");
-    second.wait().expect_code(0).expect_said(&["the controllers are done"]);
+    second.wait().expect_code(0).expect_stderr(&["the controllers are done"]);
     controller.wait().expect_code(0);
     let report = scene.report();
     assert!(count(&report, "/bus/disconnects") >= 1 && count(&report, "/bus/reconnects") >= 1);

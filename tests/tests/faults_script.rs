@@ -1,7 +1,7 @@
 //! Scripts of faults: the same bytes from the same one, refused when wrong, and a table of which no row is forgotten.
 
 use std::collections::BTreeSet;
-use system_tests::broken::{Left, Plan};
+use system_tests::broken::{FaultRun, FaultRunPlan};
 use system_tests::{Pace, Program, SHORT, Scene, expect_same, same, workspace};
 
 #[test]
@@ -9,9 +9,10 @@ fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() 
     let script = "seed = 3\n[[fault]]\nname = \"position-sensor-noise\"\nat = \"drive\"\n\
                   [[fault]]\nname = \"bus-loss\"\nprobability = 0.1\n\
                   [[fault]]\nname = \"chamber-leak\"\nat = \"load.b\"\nleakage_nl_per_min = 50\n";
-    let run = |faults: &str| Plan { faults, act: |_| Some([0.3, 0.2]), ..Plan::default() }.run();
+    let run =
+        |faults: &str| FaultRunPlan { faults, act: |_| Some([0.3, 0.2]), ..FaultRunPlan::default() }.run();
     let [one, other] = [run(script), run(script)];
-    let folder = |left: &Left| left.scene.path("emulator");
+    let folder = |outcome: &FaultRun| outcome.scene.path("emulator");
     let files = ["measurement.csv", "truth.csv", "bus.log", "faults.csv"];
     expect_same(&folder(&one), &folder(&other), &files, "differs");
     let drawn_anew = run(&script.replace("seed = 3", "seed = 4"));
@@ -21,7 +22,7 @@ fn the_same_script_gives_the_same_bytes_and_none_gives_those_of_a_run_without() 
     }
     let later = "[[fault]]\nname = \"valve-dead\"\nat = \"drive\"\nfrom_s = 50\n";
     let [without, waiting] = [run(""), run(later)];
-    let [one, other] = [&without, &waiting].map(|left| folder(left).join("measurement.csv"));
+    let [one, other] = [&without, &waiting].map(|outcome| folder(outcome).join("measurement.csv"));
     assert!(same(&one, &other), "a fault that waits changes nothing");
     assert!(!without.scene.path("emulator/faults.csv").exists());
 }
@@ -82,12 +83,12 @@ fn a_script_that_is_wrong_is_refused_with_line_key_value_and_range_before_anythi
         let path = scene.write("faults.toml", &script);
         let emulator = scene.emulator(Pace::Real).with(&format!("--faults {}", path.display())).start();
         let ended = emulator.wait().expect_code(2);
-        ended.expect_said(&[path.to_str().expect("UTF-8")]).expect_said(&hints);
+        ended.expect_stderr(&[path.to_str().expect("UTF-8")]).expect_stderr(&hints);
         assert!(!scene.path("emulator").exists(), "no folder before the script is good");
     }
     let scene = Scene::new(SHORT);
     let missing = scene.emulator(Pace::Real).with("--faults /nowhere/faults.toml").start();
-    missing.wait().expect_code(2).expect_said(&["cannot read /nowhere/faults.toml"]);
+    missing.wait().expect_code(2).expect_stderr(&["cannot read /nowhere/faults.toml"]);
     let path = scene.write("faults.toml", "\n[[fault]]\nname = \"bus-loss\"\n");
     let emulator =
         scene.emulator(Pace::Real).bus("can://vcan0").with(&format!("--faults {}", path.display()));
@@ -95,5 +96,5 @@ fn a_script_that_is_wrong_is_refused_with_line_key_value_and_range_before_anythi
         .start()
         .wait()
         .expect_code(2)
-        .expect_said(&[":2: bus-loss: only the embedded bus", "unix:///PATH"]);
+        .expect_stderr(&[":2: bus-loss: only the embedded bus", "unix:///PATH"]);
 }

@@ -35,7 +35,7 @@ fn expect_complete(scene: &Scene, pace: Pace, signal: Signal) {
 
 fn expect_interrupted(running: Running) {
     let ended = running.wait().expect_code(INTERRUPTED);
-    ended.expect_said(&["interrupted; everything recorded so far is saved"]);
+    ended.expect_stderr(&["interrupted; everything recorded so far is saved"]);
 }
 
 /// In lockstep the emulator did not wait for its farewell to be delivered once it was interrupted: now and then the host
@@ -48,7 +48,7 @@ fn an_emulator_that_is_interrupted_says_so_saves_all_and_sends_the_controller_ho
             let (scene, emulator, controller) = under_way(pace);
             emulator.signal(signal);
             expect_interrupted(emulator);
-            controller.wait().expect_code(0).expect_said(&["the rig has ended"]);
+            controller.wait().expect_code(0).expect_stderr(&["the rig has ended"]);
             expect_complete(&scene, pace, signal);
         }
     }
@@ -70,7 +70,7 @@ fn a_controller_that_is_interrupted_saves_all_and_the_emulator_says_what_it_miss
         let (scene, emulator, controller) = under_way(Pace::Lockstep);
         controller.signal(signal);
         expect_interrupted(controller);
-        emulator.wait().expect_code(3).expect_said(&["all members left the barrier"]);
+        emulator.wait().expect_code(3).expect_stderr(&["all members left the barrier"]);
         expect_complete(&scene, Pace::Lockstep, signal);
     }
 }
@@ -87,9 +87,9 @@ fn both_interrupted_at_once_save_all() {
             // The rig's farewell may reach it before its own signal does; then it ends as if it had been alone.
             let controller = controller.wait();
             match controller.code {
-                Some(0) => drop(controller.expect_said(&["the rig has ended"])),
+                Some(0) => drop(controller.expect_stderr(&["the rig has ended"])),
                 _ => drop(
-                    controller.expect_code(INTERRUPTED).expect_said(&["interrupted; everything recorded"]),
+                    controller.expect_code(INTERRUPTED).expect_stderr(&["interrupted; everything recorded"]),
                 ),
             }
             expect_complete(&scene, pace, signal);

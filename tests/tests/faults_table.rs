@@ -5,7 +5,7 @@
 //! noise of 20 um, 0.5 N and 400 Pa, steps below that.
 
 use protocol::frames::RigStatus;
-use system_tests::broken::{BEGINS, ENDS, Left, Plan, Row, fault};
+use system_tests::broken::{BEGINS, ENDS, FaultRun, FaultRunPlan, Row, fault};
 
 const ATMOSPHERE_PA: f64 = 101_325.0;
 
@@ -65,8 +65,8 @@ impl Channel {
 }
 
 /// Both axes move throughout.
-fn moving(faults: &str) -> Left {
-    Plan { faults, act: |_| Some([0.3, 0.3]), ..Plan::default() }.run_with_marks()
+fn moving(faults: &str) -> FaultRun {
+    FaultRunPlan { faults, act: |_| Some([0.3, 0.3]), ..FaultRunPlan::default() }.run_with_marks()
 }
 
 /// One kind of fault in all eight sensors at once; `numbers` makes them from unit and size. Errors against the truth follow,
@@ -75,18 +75,18 @@ fn all_sensors(
     kind: &str,
     numbers: impl Fn(&str, f64) -> String,
     check: impl Fn(&Channel, &[f64], &[f64], &[f64]),
-) -> Left {
+) -> FaultRun {
     let script: String = CHANNELS
         .iter()
         .map(|Channel { at, of, .. }| {
             fault(&format!("{}-sensor-{kind}", of.name), at, &numbers(of.unit, of.size))
         })
         .collect();
-    let left = moving(&script);
+    let outcome = moving(&script);
     for channel in &CHANNELS {
-        let shown = left.measurement.column(channel.shown);
+        let shown = outcome.measurement.column(channel.shown);
         let truth: Vec<_> =
-            left.truth.column(channel.truth).into_iter().map(|truth| truth + channel.mounted).collect();
+            outcome.truth.column(channel.truth).into_iter().map(|truth| truth + channel.mounted).collect();
         let errors: Vec<_> = shown.iter().zip(&truth).map(|(shown, truth)| shown - truth).collect();
         // Before and after a sensor is sound.
         for k in (BEGINS - 100..BEGINS).chain(ENDS..ENDS + 80) {
@@ -94,7 +94,7 @@ fn all_sensors(
         }
         check(channel, &shown, &truth, &errors);
     }
-    left
+    outcome
 }
 
 fn mean(values: &[f64]) -> f64 {
@@ -112,7 +112,7 @@ fn sensors_stick_and_drop_out_and_the_status_says_which_are_at_an_end() {
             assert!(shown[ENDS..].iter().any(|value| value != &stuck[0]), "{at} stays stuck");
         },
     );
-    let left = all_sensors(
+    let outcome = all_sensors(
         "dropout",
         |_, _| String::new(),
         |channel, shown, _, _| {
@@ -130,7 +130,7 @@ fn sensors_stick_and_drop_out_and_the_status_says_which_are_at_an_end() {
             && status.load_pressure_a_saturated
             && status.load_pressure_b_saturated
     };
-    let all = left.statuses().filter(all_saturated).count();
+    let all = outcome.statuses().filter(all_saturated).count();
     assert_eq!(all, 11, "ten in 0.1 s, and what came since the last of them");
 }
 
@@ -204,23 +204,24 @@ fn reported(cycle: u32) -> Option<[f64; 2]> {
     Some([if cycle < 249 { 0.5 } else { -0.4 }, 0.0])
 }
 
-fn with_valve(name: &str, numbers: &str) -> Left {
-    let left =
-        Plan { faults: &fault(name, "drive", numbers), act: reported, ..Plan::default() }.run_with_marks();
-    let reported = left.measurement.column("drive_valve");
+fn with_valve(name: &str, numbers: &str) -> FaultRun {
+    let outcome =
+        FaultRunPlan { faults: &fault(name, "drive", numbers), act: reported, ..FaultRunPlan::default() }
+            .run_with_marks();
+    let reported = outcome.measurement.column("drive_valve");
     assert!(
         reported[100] > 0.49 && reported[249] > 0.49 && reported[250] < -0.39,
         "the record shows what was commanded"
     );
-    left
+    outcome
 }
 
 #[test]
 fn a_stuck_valve_holds_its_spool_and_the_flow() {
-    let left = with_valve("valve-stuck", "");
-    let spool = left.truth.column("drive_spool");
+    let outcome = with_valve("valve-stuck", "");
+    let spool = outcome.truth.column("drive_spool");
     assert!(spool[BEGINS..=ENDS].iter().all(|s| s.to_bits() == spool[BEGINS].to_bits()), "it moves");
-    let flow = left.truth.column("drive_edge_flow_a_m3_per_s");
+    let flow = outcome.truth.column("drive_edge_flow_a_m3_per_s");
     assert!(flow[251..ENDS].iter().all(|flow| *flow > 1e-4), "supplied against the command of -0.4");
     // Ten time constants of 1.6 ms after its end the spool is where it is asked to be, and the chamber exhausts.
     assert!((spool[ENDS + 20] + 0.4).abs() < 1e-3 && flow[ENDS + 20] < -1e-4);
@@ -234,13 +235,13 @@ fn a_dead_a_limited_and_an_offset_valve_go_elsewhere() {
         ("valve-limited", "limit = 0.1", 0.1, -0.1),
         ("valve-offset", "offset = 0.2", 0.7, -0.2),
     ] {
-        let left = with_valve(name, numbers);
-        let spool = left.truth.column("drive_spool");
+        let outcome = with_valve(name, numbers);
+        let spool = outcome.truth.column("drive_spool");
         assert!((spool[249] - before).abs() < 3e-4, "{name}: {}", spool[249]);
         assert!((spool[ENDS - 1] - after).abs() < 3e-4, "{name}: {}", spool[ENDS - 1]);
         assert!((spool[ENDS + 50] + 0.4).abs() < 3e-4, "{name}: it is whole again");
         if name == "valve-dead" {
-            let flow = left.truth.column("drive_edge_flow_a_m3_per_s");
+            let flow = outcome.truth.column("drive_edge_flow_a_m3_per_s");
             assert!(flow[BEGINS + 20..ENDS].iter().all(|flow| *flow == 0.0), "nothing passes it");
         }
     }
@@ -262,7 +263,7 @@ fn a_slow_valve_follows_with_its_time_constant() {
 #[test]
 fn the_supply_sags_and_fails_with_its_time_constant() {
     let run = |name: &str, numbers: &str| {
-        Plan { faults: &fault(name, "supply", numbers), ..Plan::default() }.run_with_marks()
+        FaultRunPlan { faults: &fault(name, "supply", numbers), ..FaultRunPlan::default() }.run_with_marks()
     };
     let sags = run("supply-sag", "drop_pa = 300000\ntime_constant_s = 0.05");
     let sagging = sags.truth.column("supply_pressure_Pa");
@@ -275,30 +276,31 @@ fn the_supply_sags_and_fails_with_its_time_constant() {
         assert!((failing[k] - (ATMOSPHERE_PA + (7e5 - ATMOSPHERE_PA) * left)).abs() < 1e-6, "cycle {k}");
     }
     assert!(sagging[ENDS + 90] > sagging[ENDS] + 5e4, "it recovers");
-    let shut =
-        |left: &Left| left.truth.column("check_valves_shut").iter().filter(|shut| **shut == 1.0).count();
+    let shut = |outcome: &FaultRun| {
+        outcome.truth.column("check_valves_shut").iter().filter(|shut| **shut == 1.0).count()
+    };
     assert_eq!(shut(&sags), 0, "the pilot pressure is below");
     assert!(shut(&fails) > 10, "the check valves close below their pilot pressure");
 }
 
 /// Air leaves a chamber whose piston is held by friction, so that its volume stays.
-fn held(name: &str, numbers: &str) -> Left {
+fn held(name: &str, numbers: &str) -> FaultRun {
     let faults = fault(name, "drive.a", numbers) + &fault("friction-rise", "drive", "factor = 100.0");
-    let left = Plan { faults: &faults, ..Plan::default() }.run_with_marks();
-    let position = left.truth.column("drive_position_m");
+    let outcome = FaultRunPlan { faults: &faults, ..FaultRunPlan::default() }.run_with_marks();
+    let position = outcome.truth.column("drive_position_m");
     assert!(
         position[BEGINS..ENDS].iter().all(|x| x.to_bits() == position[0].to_bits()),
         "the piston is held"
     );
-    left
+    outcome
 }
 
 const VOLUME_M3: f64 = 20e-6 + 1963.5e-6 * 0.25;
 
 #[test]
 fn a_burst_hose_empties_the_chamber_with_the_computed_time_constant() {
-    let left = held("hose-burst", "kv_m3_per_h = 1.5");
-    let pressure = left.truth.column("drive_pressure_a_Pa");
+    let outcome = held("hose-burst", "kv_m3_per_h = 1.5");
+    let pressure = outcome.truth.column("drive_pressure_a_Pa");
     let tau_s = VOLUME_M3 / (ATMOSPHERE_PA * 12.95 * 1.5 / 1e5 / 3600.0);
     let choked = (BEGINS..ENDS).take_while(|k| pressure[*k] > 2.0 * ATMOSPHERE_PA);
     let mut compared = 0;
@@ -309,7 +311,7 @@ fn a_burst_hose_empties_the_chamber_with_the_computed_time_constant() {
         compared += 1;
     }
     assert!(compared > 20, "choked for {compared} ms only");
-    let other = left.truth.column("drive_pressure_b_Pa");
+    let other = outcome.truth.column("drive_pressure_b_Pa");
     assert!((other[ENDS - 1] / other[0] - 1.0).abs() < 1e-9, "the other chamber keeps its air");
 }
 
@@ -332,9 +334,9 @@ fn a_leaking_chamber_empties_as_the_law_of_the_gap_says() {
 fn friction_that_rises_holds_an_axis_that_would_move() {
     let act = |cycle: u32| Some([if cycle < 199 { 0.0 } else { 0.5 }, if cycle < 199 { 0.0 } else { 0.5 }]);
     let faults = fault("friction-rise", "drive", "factor = 100.0");
-    let left = Plan { faults: &faults, act, ..Plan::default() }.run_with_marks();
+    let outcome = FaultRunPlan { faults: &faults, act, ..FaultRunPlan::default() }.run_with_marks();
     let way = |column: &str| {
-        let x = left.truth.column(column);
+        let x = outcome.truth.column(column);
         [(x[ENDS - 1] - x[BEGINS]).abs(), (x[ENDS + 99] - x[ENDS]).abs()]
     };
     let [held_m, _] = way("drive_position_m");
@@ -348,9 +350,9 @@ fn friction_that_rises_holds_an_axis_that_would_move() {
 fn mass_on_top_is_what_forces_have_to_move() {
     let faults =
         fault("added-mass", "drive", "mass_kg = 20.0") + &fault("added-mass", "load", "mass_kg = 3.0");
-    let left = moving(&faults);
+    let outcome = moving(&faults);
     for (axis, own_kg, added_kg) in [("drive", 5.0, 20.0), ("load", 1.5, 3.0)] {
-        let column = |name: &str| left.truth.column(&format!("{axis}_{name}"));
+        let column = |name: &str| outcome.truth.column(&format!("{axis}_{name}"));
         let forces =
             ["pneumatic", "hand", "contact", "viscous_friction", "sliding_friction", "holding", "effect"]
                 .map(|name| column(&format!("{name}_force_N").replace("friction_force", "friction")));
@@ -374,32 +376,33 @@ fn rods_part_once_and_an_axis_hits_the_end_of_its_stroke() {
     let rig = "carriage_position_m = 0.25\nlinked = true\n";
     // Against the air that a shut valve traps, 3000 N would not do.
     let act = |cycle: u32| Some([if cycle < 249 { 0.0 } else { 1.0 }, 0.0]);
-    let left = Plan { rig, faults, cycles: 700, act, ..Plan::default() }.run_with_marks();
-    let linked: Vec<_> = left.statuses().map(|status| status.linked).collect();
+    let outcome = FaultRunPlan { rig, faults, cycles: 700, act, ..FaultRunPlan::default() }.run_with_marks();
+    let linked: Vec<_> = outcome.statuses().map(|status| status.linked).collect();
     // The status of every tenth cycle, in the fifth.
     let parted = linked.iter().position(|linked| !linked).expect("the rods part");
     assert_eq!(parted, BEGINS / 10);
     assert!(linked[parted..].iter().all(|linked| !linked), "they stay parted");
-    let rows = left.rows();
+    let rows = outcome.rows();
     let what: Vec<_> = rows.iter().map(|row| (row.fault.as_str(), row.what.as_str())).collect();
     assert_eq!(what, [("mechanical-unlink", "begins"), ("end-stop-hit", "begins"), ("end-stop-hit", "ends")]);
-    let (x, v) = (left.truth.column("drive_position_m"), left.truth.column("drive_rod_velocity_m_per_s"));
+    let (x, v) =
+        (outcome.truth.column("drive_position_m"), outcome.truth.column("drive_rod_velocity_m_per_s"));
     let hit = rows[2].cycle;
     assert_eq!((x[hit], v[hit]), (0.5, 0.0), "it stops dead at the end");
     assert!(v[hit - 2] > 0.1, "it came with {} m/s", v[hit - 2]);
-    assert_eq!(left.truth.column("drive_hand_force_N")[hit], 0.0, "and is let go");
+    assert_eq!(outcome.truth.column("drive_hand_force_N")[hit], 0.0, "and is let go");
 }
 
 #[test]
 fn conditions_begin_a_fault_when_the_rig_is_there() {
     let faults = "[[fault]]\nname = \"valve-dead\"\nat = \"drive\"\nwhen = \"drive.position_m\"\nabove = 0.26\nfor_s = 0.05\n\
                   [[fault]]\nname = \"supply-loss\"\nwhen = \"drive.pressure_a_pa\"\nabove = 9e5\nto_s = 0.3\n";
-    let left = moving(faults);
-    let x = left.truth.column("drive_position_m");
+    let outcome = moving(faults);
+    let x = outcome.truth.column("drive_position_m");
     let passed = x.iter().position(|x| *x > 0.26).expect("it passes 0.26 m");
     let row = |number, what: &str| {
-        let found = left.rows().into_iter().find(|row: &Row| row.number == number && row.what == what);
-        found.unwrap_or_else(|| panic!("fault {number} never {what}: {:?}", left.rows())).cycle
+        let found = outcome.rows().into_iter().find(|row: &Row| row.number == number && row.what == what);
+        found.unwrap_or_else(|| panic!("fault {number} never {what}: {:?}", outcome.rows())).cycle
     };
     assert_eq!((row(1, "begins"), row(1, "ends")), (passed, passed + 50));
     assert_eq!(row(2, "never-began"), 300);

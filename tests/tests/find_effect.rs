@@ -3,13 +3,13 @@
 
 use std::fs;
 use std::path::Path;
-use system_tests::{Ended, PATIENCE, SHORT, Scene, install, json, script};
+use system_tests::{CompletedProcess, PATIENCE, SHORT, Scene, install, json, script};
 
 /// Draws a leakage of 5.9 Nl/min across the load's piston: far above its detection limit.
 const SEED: &str = "9";
 const HIDDEN: &str = "piston-leakage at load";
 
-fn find_effect(arguments: &[&str]) -> Ended {
+fn find_effect(arguments: &[&str]) -> CompletedProcess {
     script("find-effect", arguments, 6 * PATIENCE)
 }
 
@@ -31,7 +31,7 @@ fn help_tells_options_files_and_exit_codes() {
     let ended = find_effect(&["--help"]).expect_code(0);
     let parts =
         ["--seed", "--lockstep", "--expect-right", "gap.html", "Exit codes: 0 done", "130 interrupted"];
-    ended.expect_printed(&parts);
+    ended.expect_stdout(&parts);
 }
 
 #[test]
@@ -50,7 +50,7 @@ fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
         (&["--hidden", "x", "--effects", "2"], "--effects"),
     ];
     for (arguments, hint) in wrong {
-        find_effect(arguments).expect_code(2).expect_said(&[hint]);
+        find_effect(arguments).expect_code(2).expect_stderr(&[hint]);
     }
 }
 
@@ -88,7 +88,7 @@ fn what_was_named_is_held_against_the_seal() {
             ["--lockstep", "--seed", SEED, "--expect-right", "--discrepancy", &program, "--out", out];
         let ended = find_effect(&[&options[..], &short].concat()).expect_code(*code);
         let hidden = format!("hidden: {HIDDEN} (leakage_nl_per_min 5.89");
-        ended.expect_printed(&[*reported, &hidden]);
+        ended.expect_stdout(&[*reported, &hidden]);
         if *code == 0 {
             assert!(ended.stdout.contains("(leakage_nl_per_min 5.912 +- 0.051 Nl/min)"), "{}", ended.stdout);
         }
@@ -115,7 +115,7 @@ fn a_term_from_a_file_is_hidden_and_held_against_what_is_named() {
             ["--lockstep", "--hidden", &hidden, "--suspects", &hidden, "--expect-right", "--out", &out];
         let more = ["--discrepancy", &program, "--experiment", &experiment, "--held-out", &experiment];
         let ended = find_effect(&[&options[..], &more].concat()).expect_code(code);
-        ended.expect_printed(&["hidden: eddy-brake at drive.force (-(30[N s/m] + 160[N s/m^2]*x)*v)"]);
+        ended.expect_stdout(&["hidden: eddy-brake at drive.force (-(30[N s/m] + 160[N s/m^2]*x)*v)"]);
     }
     // It acted in the runs measured, and only the last step may know.
     let truth = scene.path("eddy-brake").join("seed-1/hidden/truth-fitted-measured.csv");
@@ -130,7 +130,7 @@ fn a_sealed_effect_is_found_over_the_bus_added_and_the_gap_shrinks() {
     let out = out.to_str().expect("a path in ASCII");
     let ended = find_effect(&["--lockstep", "--seed", SEED, "--expect-right", "--out", out]).expect_code(0);
     // The rig itself is a column.
-    ended.expect_printed(&[&format!("named: {HIDDEN}"), " repeated |"]);
+    ended.expect_stdout(&[&format!("named: {HIDDEN}"), " repeated |"]);
     let folder = Path::new(out).join("seed-9");
     // What names the hidden terms of the rig measured once more lies where only the last step looks.
     let repeated = folder.join("held-out/repeated");

@@ -256,7 +256,7 @@ fn gdb_stops_the_core_while_the_rig_waits_and_the_run_is_the_same_to_the_byte() 
             debugger.args(commands.iter().flat_map(|command| ["-ex", command]));
             let ended = Running::start("gdb", &mut debugger).wait().expect_code(0);
             // It has been on for 10 ms before the first cycle.
-            ended.expect_printed(&[
+            ended.expect_stdout(&[
                 "motion_step (control=",
                 "take_sensors",
                 "$1 = 123",
@@ -285,7 +285,7 @@ fn what_is_no_elf_of_the_chip_and_no_bus_is_refused_in_words() {
     ];
     for (arguments, words) in cases {
         let mut command = mcu_command(&scene);
-        Running::start("mcu", command.args(arguments)).wait().expect_code(2).expect_said(&[words]);
+        Running::start("mcu", command.args(arguments)).wait().expect_code(2).expect_stderr(&[words]);
     }
 }
 
@@ -343,7 +343,7 @@ fn a_fault_and_the_end_of_main_are_told_and_no_silence() {
         Running::start("mcu", command.args(["--bus", &scene.url()]))
             .wait()
             .expect_code(3)
-            .expect_said(&[words]);
+            .expect_stderr(&[words]);
         // The rig has lost its member, or never had it.
         drop(emulator);
     }

@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 use system_tests::firmware::{Positioned, build, positioned_where_it_ran};
 use system_tests::foreign_python::{python, tools_path};
-use system_tests::stalls::Stalls;
+use system_tests::stalls::StallWatch;
 use system_tests::{
     Build, PATIENCE, Pace, Packet, Program, Running, Scene, count, executable, shipped_programs, turn,
     workspace,
@@ -113,7 +113,7 @@ fn it_positions_within_the_bounds_in_real_time() {
     let _turn = turn::take();
     let done = (1..=ATTEMPTS)
         .find_map(|attempt| {
-            let stalls = Stalls::of(elf.to_str().expect("text"));
+            let stalls = StallWatch::of(elf.to_str().expect("text"));
             let done = positions(&elf);
             let stalled = stalls.longest();
             eprintln!("attempt {attempt} of {ATTEMPTS}: kept from running for {stalled:?}");
@@ -167,7 +167,7 @@ fn the_check_of_controllers_passes_its_function() {
     let elf = elf();
     let _turn = turn::take();
     for attempt in 1..=ATTEMPTS {
-        let stalls = Stalls::of(elf.to_str().expect("text"));
+        let stalls = StallWatch::of(elf.to_str().expect("text"));
         let (words, others) = checked();
         let stalled = stalls.longest();
         eprintln!(
@@ -215,13 +215,13 @@ fn gdb_stops_it_while_the_rig_goes_on_and_a_fault_is_told() {
     debugger.args(commands.iter().flat_map(|command| ["-ex", command]));
     // When the program ends itself QEMU goes, which GDB takes for an error.
     let session = Running::start("gdb", &mut debugger).wait();
-    session.expect_printed(&[
+    session.expect_stdout(&[
         "motion_step (control=",
         "firmware_receive",
         "$1 = APPROACH",
         "Value returned is",
     ]);
-    qemu.wait().expect_code(3).expect_said(&["firmware: prefetch abort at 0xC0000000"]);
+    qemu.wait().expect_code(3).expect_stderr(&["firmware: prefetch abort at 0xC0000000"]);
     emulator.interrupt().expect_code(130);
 }
 
@@ -258,7 +258,7 @@ fn what_it_cannot_run_is_refused_in_words() {
         (&["--fast"], 2, "unknown argument --fast"),
     ];
     for (arguments, code, words) in cases {
-        Running::start("qemu-r5f", script().args(arguments)).wait().expect_code(code).expect_said(&[words]);
+        Running::start("qemu-r5f", script().args(arguments)).wait().expect_code(code).expect_stderr(&[words]);
     }
 }
 

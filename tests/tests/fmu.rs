@@ -5,12 +5,12 @@ use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
 use system_tests::foreign_python::run_script;
-use system_tests::{Ended, Program, Running, SHORT, Scene, Table, same};
+use system_tests::{CompletedProcess, Program, Running, SHORT, Scene, Table, same};
 
 /// Largest difference that is none: the numbers go through a CSV with all their digits.
 const TOLERANCE: f64 = 1e-9;
 
-fn export(rig: &Path, out: &Path, options: &[&str]) -> Ended {
+fn export(rig: &Path, out: &Path, options: &[&str]) -> CompletedProcess {
     let mut bench = Program::Bench.command();
     bench.arg("export-fmu").arg("--rig").arg(rig).arg("--out").arg(out);
     Running::start("bench export-fmu", bench.args(options)).wait()
@@ -163,10 +163,10 @@ fn the_same_rig_gives_the_same_file_and_what_is_none_is_refused() {
     assert!(same(&one, &other));
     let bad = scene.rig_with("bad.toml", "pressure_bar = 7.0", "pressure_bar = 70");
     let out = scene.path("bad.fmu");
-    export(&bad, &out, &[]).expect_code(2).expect_said(&["bad.toml:", "pressure_bar = 70 is out of range"]);
+    export(&bad, &out, &[]).expect_code(2).expect_stderr(&["bad.toml:", "pressure_bar = 70 is out of range"]);
     assert!(!out.exists());
     let none = scene.path("none.so");
     let said =
         export(&scene.path("rig.toml"), &out, &["--library", none.to_str().expect("UTF-8")]).expect_code(2);
-    said.expect_said(&["none.so"]);
+    said.expect_stderr(&["none.so"]);
 }

@@ -7,7 +7,9 @@ use std::os::unix::fs::{OpenOptionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use system_tests::foreign_python::{of, tools_path};
-use system_tests::{Build, Ended, Program, Running, executable, install, turn, wait_until, workspace};
+use system_tests::{
+    Build, CompletedProcess, Program, Running, executable, install, turn, wait_until, workspace,
+};
 
 /// PREFIX/bin/airbench, PREFIX/lib/airbench with the programs, PREFIX/share/airbench with the files, and a working directory.
 struct Prefix(tempfile::TempDir);
@@ -48,7 +50,7 @@ impl Prefix {
         command
     }
 
-    fn run(&self, arguments: &[&str]) -> Ended {
+    fn run(&self, arguments: &[&str]) -> CompletedProcess {
         Running::start("airbench", &mut self.command(arguments)).wait()
     }
 }
@@ -58,12 +60,12 @@ fn an_unknown_command_is_answered_with_the_commands_that_there_are() {
     let prefix = Prefix::made();
     let known =
         "run, latency, find-effect, close, can, test, emulator, controller, bench, discrepancy, campaign";
-    prefix.run(&["fly"]).expect_code(2).expect_said(&["unknown command 'fly'", known]);
-    prefix.run(&[]).expect_code(2).expect_said(&["Usage: airbench <COMMAND>", "discrepancy"]);
+    prefix.run(&["fly"]).expect_code(2).expect_stderr(&["unknown command 'fly'", known]);
+    prefix.run(&[]).expect_code(2).expect_stderr(&["Usage: airbench <COMMAND>", "discrepancy"]);
     prefix
         .run(&["run", "--help"])
         .expect_code(0)
-        .expect_printed(&["Usage: airbench run [OPTIONS]", "--lockstep"]);
+        .expect_stdout(&["Usage: airbench run [OPTIONS]", "--lockstep"]);
 }
 
 #[test]
@@ -72,7 +74,7 @@ fn find_effect_hides_at_most_as_many_effects_as_the_catalogue_has() {
     let one_more = (all + 1).to_string();
     let refused =
         Prefix::made().run(&["find-effect", "--held-out", "identification", "--effects", &one_more]);
-    refused.expect_code(2).expect_said(&[&format!("allowed are 0 to {all} here")]);
+    refused.expect_code(2).expect_stderr(&[&format!("allowed are 0 to {all} here")]);
 }
 
 #[test]
@@ -84,14 +86,16 @@ fn a_program_or_file_that_is_missing_is_named_with_every_path_looked_at() {
         [&["bench", "figures"][..], &["can", "--", "true"], &["run", "--watch"], &["run", "--gateway"]]
     {
         let ended = prefix.run(arguments).expect_code(2);
-        ended.expect_said(&["the program 'bench' is not there", &paths[0], &paths[1], "AIRBENCH_BIN=DIR"]);
+        ended.expect_stderr(&["the program 'bench' is not there", &paths[0], &paths[1], "AIRBENCH_BIN=DIR"]);
     }
     // A run without page and gateway needs no bench.
     let _ = prefix.run(&["run", "--lockstep"]).expect_code(0);
     fs::remove_file(prefix.path("share/airbench/rig.toml")).expect("a link of our own");
     let path = prefix.path("share/airbench/rig.toml").display().to_string();
-    let _ =
-        prefix.run(&["close", "--train", "a.csv"]).expect_code(2).expect_said(&[&path, "AIRBENCH_SHARE=DIR"]);
+    let _ = prefix
+        .run(&["close", "--train", "a.csv"])
+        .expect_code(2)
+        .expect_stderr(&[&path, "AIRBENCH_SHARE=DIR"]);
 }
 
 #[test]
@@ -102,29 +106,29 @@ fn a_command_that_is_a_program_has_its_words_and_its_exit_codes() {
     let refused = Program::Bench.start(&[&"summary", &"/nowhere"]).wait().expect_code(2);
     assert_eq!(prefix.run(&["bench", "summary", "/nowhere"]).expect_code(2).stderr, refused.stderr);
     prefix.run(&["can", "--pair", "--", "sh", "-c", "exit 7"]).expect_code(7);
-    prefix.run(&["close", "--help"]).expect_code(0).expect_printed(&["Usage: discrepancy close"]);
+    prefix.run(&["close", "--help"]).expect_code(0).expect_stdout(&["Usage: discrepancy close"]);
     // The shipped rig file is read before the record.
     prefix
         .run(&["close", "--train", "/nowhere.csv"])
         .expect_code(2)
-        .expect_said(&["cannot read /nowhere.csv"]);
+        .expect_stderr(&["cannot read /nowhere.csv"]);
 }
 
 #[test]
 fn an_installed_run_needs_its_prefix_alone_and_leaves_its_folder_where_it_was_started() {
     let prefix = Prefix::made();
     let ended = prefix.run(&["run", "--lockstep"]).expect_code(0);
-    ended.expect_printed(&[
+    ended.expect_stdout(&[
         "running point-to-point on unix://",
         "passed                                        yes",
     ]);
     assert!(prefix.path("work/runs/latest/measurement.csv").is_file());
-    prefix.run(&["run", "--list"]).expect_code(0).expect_printed(&["\nload-step "]);
-    prefix.run(&["run", "loadstep"]).expect_code(2).expect_said(&["airbench run --list names them"]);
+    prefix.run(&["run", "--list"]).expect_code(0).expect_stdout(&["\nload-step "]);
+    prefix.run(&["run", "loadstep"]).expect_code(2).expect_stderr(&["airbench run --list names them"]);
     let typo = prefix.path("typo.toml");
     fs::write(&typo, "[passed]\nposition_eror_m = 1\n").expect("a folder of our own");
     let refused = prefix.run(&["run", "--lockstep", &typo.to_string_lossy()]).expect_code(2);
-    refused.expect_said(&["airbench run: [passed] position_eror_m = 1: no such figure"]);
+    refused.expect_stderr(&["airbench run: [passed] position_eror_m = 1: no such figure"]);
 }
 
 /// With shell scripts in place of both programs; that of the emulator begins with the folder of the run in `$2`.
@@ -142,7 +146,7 @@ fn in_place_of_both(emulator: &str, controller: &str) -> Prefix {
 #[test]
 fn a_failed_run_that_cannot_be_summed_up_keeps_its_exit_code() {
     let prefix = in_place_of_both("echo '{' >\"$2/summary.json\"\nexit 3", "exec sleep 60");
-    prefix.run(&["run", "--lockstep"]).expect_code(3).expect_said(&["airbench run: ", "summary.json"]);
+    prefix.run(&["run", "--lockstep"]).expect_code(3).expect_stderr(&["airbench run: ", "summary.json"]);
 }
 
 #[test]
@@ -165,7 +169,7 @@ fn ctrl_c_ends_a_summary_that_takes_long() {
 fn a_run_in_real_time_and_a_program_of_can_meet_on_the_users_bus_and_a_second_run_has_its_own() {
     let name = "a_run_in_real_time_and_a_program_of_can_meet_on_the_users_bus_and_a_second_run_has_its_own";
     if Path::new("/sys/class/net/vcan0").exists() {
-        system_tests::skip::tell(name, "the kernel has a vcan0, which a run takes");
+        system_tests::skip::report(name, "the kernel has a vcan0, which a run takes");
         return;
     }
     let _machine = turn::take();
@@ -225,7 +229,7 @@ fn a_suite_of_tests_is_run_by_the_interpreter_that_has_the_package() {
     install(b"#!/bin/sh\necho \"No module named 'airbench_hil'\" >&2\nexit 1\n", &python);
     let ended =
         Running::start("airbench test", prefix.command(&["test"]).env("AIRBENCH_PYTHON", &python)).wait();
-    ended.expect_code(2).expect_said(&["No module named 'airbench_hil'", "pip install", "AIRBENCH_PYTHON"]);
+    ended.expect_code(2).expect_stderr(&["No module named 'airbench_hil'", "pip install", "AIRBENCH_PYTHON"]);
 
     let suite = "import os, airbench_hil.programs as programs\n\n\ndef test_programs():\n    \
                  assert programs.program('emulator').samefile(os.environ['EXPECTED'])\n\n\n\
@@ -236,6 +240,6 @@ fn a_suite_of_tests_is_run_by_the_interpreter_that_has_the_package() {
         command.env("AIRBENCH_PYTHON", of("hil")).env("EXPECTED", prefix.path("lib/airbench/emulator"));
         Running::start("airbench test", &mut command).wait()
     };
-    pytest("programs").expect_code(0).expect_printed(&["1 passed"]);
-    pytest("wrong").expect_code(1).expect_printed(&["1 failed"]);
+    pytest("programs").expect_code(0).expect_stdout(&["1 passed"]);
+    pytest("wrong").expect_code(1).expect_stdout(&["1 failed"]);
 }

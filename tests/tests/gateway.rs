@@ -8,8 +8,8 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
-use system_tests::door::{Door, DoorClient};
 use system_tests::foreign_python::{light_path, python};
+use system_tests::gateway::{GatewayClient, GatewayProcess};
 use system_tests::{
     PATIENCE, Pace, Packet, Peer, Running, SHORT, Scene, count, text, turn, wait_until, workspace,
 };
@@ -41,14 +41,14 @@ fn python_can_records_a_run_to_the_frame_and_cantools_decodes_it() {
     let scene = Scene::new(SHORT);
     let emulator = scene.emulator(Pace::Real).start();
     // Python on a busy machine may fall behind by more than the usual queue holds.
-    let mut door = Door::open(&scene, "--queue-frames 100000");
+    let mut gateway = GatewayProcess::open(&scene, "--queue-frames 100000");
     let log = scene.path("logged.log");
     let to_file = ["-f".to_owned(), log.display().to_string()];
     let logger = Running::start(
         "can.logger",
-        &mut python_module("can.logger", &[&to_file, &door.python_can()[..]].concat()),
+        &mut python_module("can.logger", &[&to_file, &gateway.python_can()[..]].concat()),
     );
-    door.wait_for_times("is on the bus", 1);
+    gateway.wait_for_times("is on the bus", 1);
     let controller = scene.controller(Pace::Real).start();
     emulator.wait();
     controller.wait();
@@ -59,7 +59,7 @@ fn python_can_records_a_run_to_the_frame_and_cantools_decodes_it() {
     logger.wait();
 
     let logged = frames(&log);
-    let report = door.close();
+    let report = gateway.close();
     assert_eq!(count(&report, "/frames_lost"), 0);
     // Two frames of one moment from two senders may change places on their ways: each identifier is compared by itself, from
     // wherever in the run the logger came to wherever it went.
@@ -89,9 +89,9 @@ fn python_can_records_a_run_to_the_frame_and_cantools_decodes_it() {
 #[test]
 fn python_can_sends_to_the_bus_and_to_the_other_clients() {
     let (scene, _host, peer) = Scene::with_bus();
-    let mut door = Door::open(&scene, "");
-    let mut other = DoorClient::on_the_bus(&door);
-    let port = door.address.port();
+    let mut gateway = GatewayProcess::open(&scene, "");
+    let mut other = GatewayClient::connect_raw(&gateway);
+    let port = gateway.address.port();
     let script = format!(
         "import can\n\
          with can.Bus(interface='socketcand', channel='bus', host='127.0.0.1', port={port}) as bus:\n\
@@ -110,57 +110,57 @@ fn python_can_sends_to_the_bus_and_to_the_other_clients() {
     assert_eq!(other.frame(), ("123".into(), "01A0".into()));
     assert_eq!(other.frame(), ("00000123".into(), String::new()));
     // Not its own two: a sender does not hear itself.
-    door.wait_for_times("is on the bus", 2);
+    gateway.wait_for_times("is on the bus", 2);
     peer.send(&CanFrame::from_raw(0x8000_0456, &[7]).to_bytes());
     let ended = sender.wait().expect_code(0);
     assert_eq!(ended.stdout.trim(), "0x456 True 07");
-    let report = door.close();
+    let report = gateway.close();
     assert_eq!((count(&report, "/frames_from_clients"), count(&report, "/frames_not_taken")), (2, 0));
 }
 
 #[test]
 fn python_can_replays_a_log_onto_the_bus() {
     let (scene, _host, peer) = Scene::with_bus();
-    let door = Door::open(&scene, "");
+    let gateway = GatewayProcess::open(&scene, "");
     let line = |n: usize| format!("(1700000000.{:06}) can0 5A5#{n:04X}\n", n * 200);
     let log = scene.write("replay.log", &(0..200).map(line).collect::<String>());
     let file = ["--".to_owned(), log.display().to_string()];
-    let options = [&door.python_can()[..], &file].concat();
+    let options = [&gateway.python_can()[..], &file].concat();
     let player = Running::start("can.player", &mut python_module("can.player", &options));
     for n in 0..200_u16 {
         assert_eq!(next_on(&peer), CanFrame::new(0x5A5, &n.to_be_bytes()), "frame {n}");
     }
     player.wait().expect_code(0);
-    assert_eq!(count(&door.close(), "/frames_from_clients"), 200);
+    assert_eq!(count(&gateway.close(), "/frames_from_clients"), 200);
 }
 
 #[test]
 fn who_may_only_read_sends_nothing() {
     let (scene, _host, peer) = Scene::with_bus();
-    let door = Door::open(&scene, "--read-only");
-    let mut client = DoorClient::on_the_bus(&door);
-    client.say("< send 108 2 1 0 >");
+    let gateway = GatewayProcess::open(&scene, "--read-only");
+    let mut client = GatewayClient::connect_raw(&gateway);
+    client.send("< send 108 2 1 0 >");
     client.expect("< error unknown command >");
     peer.send(&CanFrame::new(0x5A5, &[1]).to_bytes());
     assert_eq!(client.frame(), ("5A5".into(), "01".into()));
     assert_eq!(peer.receive(Duration::from_millis(50)), None);
-    assert_eq!(count(&door.close(), "/bus_counters/sent"), 0);
+    assert_eq!(count(&gateway.close(), "/bus_counters/sent"), 0);
 }
 
 #[test]
 fn the_gateway_waits_for_a_bus_that_is_not_there_yet_and_comes_back_to_one_that_was_gone() {
     let scene = Scene::new(SHORT);
-    let mut door = Door::open(&scene, "");
-    door.wait_for_times("waiting for it", 1);
-    let mut client = DoorClient::on_the_bus(&door);
+    let mut gateway = GatewayProcess::open(&scene, "");
+    gateway.wait_for_times("waiting for it", 1);
+    let mut client = GatewayClient::connect_raw(&gateway);
     for (round, there) in [(1_u8, 1), (2, 2)] {
         let host = scene.bus_host("");
-        door.wait_for_times("is there", there);
+        gateway.wait_for_times("is there", there);
         let peer = scene.peer();
         peer.send(&CanFrame::new(0x5A5, &[round]).to_bytes());
         assert_eq!(client.frame(), ("5A5".into(), format!("{round:02X}")));
         drop(host);
-        door.wait_for_times("is gone; waiting", there);
+        gateway.wait_for_times("is gone; waiting", there);
     }
-    assert_eq!(count(&door.close(), "/bus_counters/reconnects"), 1);
+    assert_eq!(count(&gateway.close(), "/bus_counters/reconnects"), 1);
 }

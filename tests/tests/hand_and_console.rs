@@ -212,7 +212,7 @@ fn what_is_typed_is_done_told_and_recorded() {
     scene.wait_for_more_rows("emulator", 300);
     emulator.type_line("quit");
     let received = peer.frames_to_the_end();
-    emulator.wait().expect_code(0).expect_said(&["ended at the console"]);
+    emulator.wait().expect_code(0).expect_stderr(&["ended at the console"]);
     let events = all(&scene.summary());
     for kind in ["emergency-stop", "emergency-stop-released", "link-refused", "unlinked", "weights"] {
         assert_eq!(times(&events, kind), 1, "{kind}: {events:?}");

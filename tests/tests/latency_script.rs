@@ -3,9 +3,9 @@
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::Path;
-use system_tests::{Ended, PATIENCE, Program, Running, json, script, skip, workspace};
+use system_tests::{CompletedProcess, PATIENCE, Program, Running, json, script, skip, workspace};
 
-fn latency(arguments: &[&str]) -> Ended {
+fn latency(arguments: &[&str]) -> CompletedProcess {
     script("latency", arguments, 2 * PATIENCE)
 }
 
@@ -13,7 +13,7 @@ fn latency(arguments: &[&str]) -> Ended {
 fn help_tells_options_files_and_exit_codes() {
     let ended = latency(&["--help"]).expect_code(0);
     let parts = ["--pairs", "--probe", "--load", "report.html", "Exit codes: 0 good; 1", "130 interrupted"];
-    ended.expect_printed(&parts);
+    ended.expect_stdout(&parts);
 }
 
 #[test]
@@ -34,7 +34,7 @@ fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
         (&["--out", "/proc/airbench"], "--out"),
     ];
     for (arguments, hint) in wrong {
-        latency(arguments).expect_code(2).expect_said(&[hint]);
+        latency(arguments).expect_code(2).expect_stderr(&[hint]);
     }
 }
 
@@ -47,7 +47,7 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
     let ended =
         latency(&[&["--pairs", "1", "--seconds", "2", "--out", out][..], &load].concat()).expect_code(0);
     let round_trip = "drive-round-trip p50 / ping-pong-bus p50";
-    ended.expect_printed(&["pair 1 of 1, cyclictest:", "left", round_trip, "spinning / claimed"]);
+    ended.expect_stdout(&["pair 1 of 1, cyclictest:", "left", round_trip, "spinning / claimed"]);
     let run = Path::new(out).join("pair-01/run");
     for file in ["run.json", "summary.json", "ping-pong.json", "ping-pong-bus.hlog", "conditions.json"] {
         assert!(run.join(file).exists(), "{file}");
@@ -70,11 +70,11 @@ fn a_pair_leaves_runs_references_reports_and_the_table() {
         assert!(ended.stdout.contains("emulator-wakeup p99 / cyclictest p99"), "{}", ended.stdout);
     } else {
         let why = reported["reference_missing_because"].as_str().expect("a reason");
-        skip::tell("a_pair_leaves_runs_references_reports_and_the_table: cyclictest", why);
+        skip::report("a_pair_leaves_runs_references_reports_and_the_table: cyclictest", why);
     }
     // A second measurement into the same folder would mix the two.
     let _ =
-        latency(&["--pairs", "1", "--seconds", "1", "--out", out]).expect_code(2).expect_said(&["earlier"]);
+        latency(&["--pairs", "1", "--seconds", "1", "--out", out]).expect_code(2).expect_stderr(&["earlier"]);
 }
 
 #[test]

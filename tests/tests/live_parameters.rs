@@ -72,7 +72,7 @@ fn a_planned_change_that_cannot_be_is_refused_with_file_line_and_range() {
         let change = format!("[[drive.change]]\nat_s = 0.1\nparameter = \"{parameter}\"\nvalue = {value}\n");
         let scene = Scene::new(&format!("{SHORT}{change}"));
         let line = SHORT.lines().count() + 1;
-        let ended = scene.controller(Pace::Real).start().wait().expect_code(2).expect_said(words);
+        let ended = scene.controller(Pace::Real).start().wait().expect_code(2).expect_stderr(words);
         let lines: Vec<_> = (line..line + 4).map(|line| format!("experiment.toml:{line}:")).collect();
         assert!(lines.iter().any(|place| ended.stderr.contains(place)), "{}", ended.stderr);
     }

@@ -12,7 +12,7 @@ const FILES: [&str; 4] =
 
 /// How a run differs from another in what must not matter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Circumstance {
+enum RunCondition {
     EmulatorFirst,
     ControllerFirst,
     MachineBusy,
@@ -20,18 +20,18 @@ enum Circumstance {
     ListenerThatNeverReads,
 }
 
-fn run(circumstance: Circumstance, options: &str) -> Scene {
+fn run(condition: RunCondition, options: &str) -> Scene {
     let scene = Scene::new(SHORT);
-    let _busy = (circumstance == Circumstance::MachineBusy).then(BusyLoops::on_every_processor);
+    let _busy = (condition == RunCondition::MachineBusy).then(BusyLoops::on_every_processor);
     let (emulator, controller) =
         (scene.emulator(Pace::Lockstep).with(options), scene.controller(Pace::Lockstep));
-    let (emulator, controller) = match circumstance {
-        Circumstance::ControllerFirst => {
+    let (emulator, controller) = match condition {
+        RunCondition::ControllerFirst => {
             let controller = controller.start();
             std::thread::sleep(Duration::from_millis(50));
             (emulator.start(), controller)
         }
-        Circumstance::ListenerThatNeverReads => {
+        RunCondition::ListenerThatNeverReads => {
             let emulator = emulator.start();
             let listener = scene.peer();
             let controller = controller.start();
@@ -42,7 +42,7 @@ fn run(circumstance: Circumstance, options: &str) -> Scene {
         }
         _ => (emulator.start(), controller.start()),
     };
-    if circumstance == Circumstance::ControllerStoppedForAWhile {
+    if condition == RunCondition::ControllerStoppedForAWhile {
         let _peer = scene.peer();
         controller.signal(Signal::STOP);
         std::thread::sleep(Duration::from_millis(300));
@@ -54,24 +54,24 @@ fn run(circumstance: Circumstance, options: &str) -> Scene {
 
 #[test]
 fn two_runs_give_the_same_files_to_the_byte_whatever_the_circumstances() {
-    let first = run(Circumstance::EmulatorFirst, "");
+    let first = run(RunCondition::EmulatorFirst, "");
     let rows = first.measurement();
     // 0.5 s to the start, 0.2 s settling, 0.65 s experiment, 0.2 s settling: fewer rows would compare nothing.
     assert!(rows.len() > 1500, "{} rows", rows.len());
     assert!(first.bus_log().len() > 4 * rows.len());
-    for circumstance in [
-        Circumstance::EmulatorFirst,
-        Circumstance::ControllerFirst,
-        Circumstance::MachineBusy,
-        Circumstance::ControllerStoppedForAWhile,
-        Circumstance::ListenerThatNeverReads,
+    for condition in [
+        RunCondition::EmulatorFirst,
+        RunCondition::ControllerFirst,
+        RunCondition::MachineBusy,
+        RunCondition::ControllerStoppedForAWhile,
+        RunCondition::ListenerThatNeverReads,
     ] {
-        let again = run(circumstance, "");
-        let what = format!("differs with {circumstance:?}");
+        let again = run(condition, "");
+        let what = format!("differs with {condition:?}");
         expect_same(&first.path(""), &again.path(""), &FILES, &what);
         for figure in ["position_error_dynamic_m", "position_error_static_m"] {
             let of = |scene: &Scene| scene.report()["axes"]["drive"][figure].clone();
-            assert_eq!(of(&first), of(&again), "{figure} with {circumstance:?}");
+            assert_eq!(of(&first), of(&again), "{figure} with {condition:?}");
             assert!(of(&first).is_number(), "{figure} was measured");
         }
     }
@@ -87,7 +87,7 @@ fn an_answer_to_the_last_cycle_is_logged_however_long_it_takes() {
             std::thread::sleep(Duration::from_millis(300));
         }
         let command = ValveCommand { alive: (cycle % 16) as u8, echo: cycle as u16, ..Default::default() };
-        peer.say(&Frame::DriveValveCommand(command));
+        peer.send_frame(&Frame::DriveValveCommand(command));
     });
     emulator.wait().expect_code(0);
     let log = scene.bus_log();
@@ -97,7 +97,7 @@ fn an_answer_to_the_last_cycle_is_logged_however_long_it_takes() {
 
 #[test]
 fn another_seed_gives_another_log() {
-    let (one, other) = (run(Circumstance::EmulatorFirst, ""), run(Circumstance::EmulatorFirst, "--seed 2"));
+    let (one, other) = (run(RunCondition::EmulatorFirst, ""), run(RunCondition::EmulatorFirst, "--seed 2"));
     for file in FILES {
         assert!(!same(&one.path(file), &other.path(file)), "{file} does not depend on the seed");
     }
@@ -105,7 +105,7 @@ fn another_seed_gives_another_log() {
 
 #[test]
 fn the_log_knows_no_wall_clock() {
-    let scene = run(Circumstance::EmulatorFirst, "");
+    let scene = run(RunCondition::EmulatorFirst, "");
     let log = std::fs::read_to_string(scene.path("emulator/bus.log")).expect("a log");
     assert!(log.starts_with("(0000000000.000000) bus0 120#"), "{:?}", log.lines().next());
     assert!(scene.run_description()["started_unix_s"].is_null());

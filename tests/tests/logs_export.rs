@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 use system_tests::foreign_python::{light_path, python, run_script};
-use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, Table, run_both};
+use system_tests::{CompletedProcess, Pace, Program, Running, SHORT, Scene, Table, run_both};
 
 fn run_folder() -> PathBuf {
     static RUN: LazyLock<Scene> = LazyLock::new(|| {
@@ -19,7 +19,7 @@ fn run_folder() -> PathBuf {
     RUN.path("emulator")
 }
 
-fn export(source: &Path, format: &str, out: &Path, options: &[&str]) -> Ended {
+fn export(source: &Path, format: &str, out: &Path, options: &[&str]) -> CompletedProcess {
     let mut bench = Program::Bench.command();
     bench
         .env("AIRBENCH_PYTHON", python())
@@ -229,7 +229,7 @@ fn an_mcap_of_a_log_alone_has_no_tables_and_says_which_frames_are_no_signals() {
     let scene = Scene::new(SHORT);
     let (log, out) = (scene.write("foreign.log", FOREIGN), scene.path("foreign.mcap"));
     let said = export(&log, "mcap", &out, &[]).expect_code(0);
-    said.expect_said(&["foreign.log:2: 4 frames that rig.dbc does not know are in /can alone"]);
+    said.expect_stderr(&["foreign.log:2: 4 frames that rig.dbc does not know are in /can alone"]);
     let read = mcap_channels(&out);
     let topics: Vec<_> = read["channels"].as_object().expect("channels").keys().collect();
     assert_eq!(topics, ["/can", "/can/DriveSensors"]);
@@ -252,13 +252,13 @@ fn an_mcap_takes_no_table_that_is_none_or_whose_time_nobody_tells() {
     let broken = text.replacen("\n0.004,", "\n0.004,x", 1);
     assert_ne!(broken, text);
     fs::write(&table, broken).expect("the table");
-    export(&folder, "mcap", &out, &[]).expect_code(2).expect_said(&["measurement.csv", "line 7: 'x"]);
+    export(&folder, "mcap", &out, &[]).expect_code(2).expect_stderr(&["measurement.csv", "line 7: 'x"]);
     let left: Vec<_> = fs::read_dir(scene.path("")).expect("the scene").flatten().collect();
     assert!(left.iter().all(|file| !file.file_name().to_string_lossy().starts_with("copied.")), "{left:?}");
 
     fs::remove_file(folder.join("summary.json")).expect("it was there");
     let said = export(&folder, "mcap", &out, &[]).expect_code(0);
-    said.expect_said(&["no summary.json says when cycle 0", "the tables are left out"]);
+    said.expect_stderr(&["no summary.json says when cycle 0", "the tables are left out"]);
     let read = mcap_channels(&out);
     assert!(read["channels"].as_object().expect("channels").keys().all(|topic| topic.starts_with("/can")));
     assert_eq!(read["metadata"], serde_json::json!({}));
@@ -274,7 +274,7 @@ fn an_mcap_takes_no_table_of_a_controller_of_an_earlier_run() {
     fs::write(folder.join("controller-drive.json"), "{}").expect("a report");
     let out = scene.path("copied.mcap");
     let said = export(&folder, "mcap", &out, &[]).expect_code(0);
-    said.expect_said(&["controller-load.csv: left out"]);
+    said.expect_stderr(&["controller-load.csv: left out"]);
     let channels = &mcap_channels(&out)["channels"];
     assert!(channels["/controller/drive"].is_object() && channels["/controller/load"].is_null());
 }
@@ -340,15 +340,17 @@ fn what_is_no_log_is_refused_by_line_and_column_and_leaves_no_file() {
     ] {
         let log = scene.write("hostile.log", text);
         let out = scene.path("out.csv");
-        export(&log, "csv", &out, &[]).expect_code(2).expect_said(&[place, words]);
+        export(&log, "csv", &out, &[]).expect_code(2).expect_stderr(&[place, words]);
         let left: Vec<_> = fs::read_dir(scene.path("")).expect("the scene").flatten().collect();
         assert!(left.iter().all(|file| !file.file_name().to_string_lossy().starts_with("out.")), "{left:?}");
     }
     let log = scene.write("cut.log", "(0.000001) a 160#0100\n(0.00");
     let said = export(&log, "csv", &scene.path("cut.csv"), &[]).expect_code(0);
-    said.expect_said(&["cut.log:2: the last line is cut"]);
+    said.expect_stderr(&["cut.log:2: the last line is cut"]);
     let log = scene.write("years.log", "(1.0) a 160#0100\n(9999999999.0) a 160#0100\n");
-    export(&log, "csv", &scene.path("out.csv"), &["--every-ms", "1"]).expect_code(2).expect_said(&["cut it"]);
+    export(&log, "csv", &scene.path("out.csv"), &["--every-ms", "1"])
+        .expect_code(2)
+        .expect_stderr(&["cut it"]);
 }
 
 #[test]
@@ -356,12 +358,12 @@ fn frames_that_are_no_signals_are_told_and_a_python_without_python_can_too() {
     let scene = Scene::new(SHORT);
     let log = scene.write("odd.log", "(0.1) a 7F0#00\n(0.2) a 110#0000000000\n(0.3) a 160#0100\n");
     let said = export(&log, "csv", &scene.path("odd.csv"), &[]).expect_code(0);
-    said.expect_said(&[
+    said.expect_stderr(&[
         "odd.log:1: 1 frames that rig.dbc does not know",
         "odd.log:2: 1 frames that rig.dbc does not allow",
     ]);
     let none = scene.path("no-python");
     let none = none.to_str().expect("UTF-8");
     let said = export(&log, "blf", &scene.path("odd.blf"), &["--python", none]).expect_code(2);
-    said.expect_said(&["no-python", "pip install python-can"]);
+    said.expect_stderr(&["no-python", "pip install python-can"]);
 }

@@ -80,9 +80,9 @@ fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
     let emulator = scene.emulator(Pace::Real).with("--seconds 60").start();
     scene.wait_for_rows("emulator", 50);
     let refused = replay(&scene, &log, "").wait().expect_code(2);
-    refused.expect_said(&["a rig is live", "3 commands and 1 frames of a rig", "--leave-out commands,rig"]);
+    refused.expect_stderr(&["a rig is live", "3 commands and 1 frames of a rig", "--leave-out commands,rig"]);
     let refused = replay(&scene, &log, "--leave-out commands").wait().expect_code(2);
-    refused.expect_said(&["0 commands and 1 frames"]);
+    refused.expect_stderr(&["0 commands and 1 frames"]);
     replay(&scene, &log, "--leave-out commands,rig").wait().expect_code(0);
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!((count(&report, "/frames_sent"), count(&report, "/frames_left_out")), (1, 4));
@@ -106,7 +106,7 @@ fn a_rig_that_comes_alive_ends_a_replay_that_would_disturb_it() {
     assert_eq!(report["ended"], "live-rig");
     assert_eq!(count(&report, "/frames_sent"), (before + received(&peer, 0).len()) as u64);
     // Without what disturbs there is nothing to be sent, and with something else it goes on beside the rig.
-    replay(&scene, &log, "--leave-out 110").wait().expect_code(2).expect_said(&["nothing of"]);
+    replay(&scene, &log, "--leave-out 110").wait().expect_code(2).expect_stderr(&["nothing of"]);
 }
 
 fn received_some(peer: &Peer, count: usize) -> usize {
@@ -141,10 +141,10 @@ fn nothing_is_sent_of_a_log_that_is_not_right_to_its_last_line() {
         ("(1700000001.0) can1 110#00\n", "can0, can1: choose one with --interface"),
     ] {
         let log = scene.write("hostile.log", &format!("{}{more}", commands(3)));
-        replay(&scene, &log, "").wait().expect_code(2).expect_said(&[words]);
+        replay(&scene, &log, "").wait().expect_code(2).expect_stderr(&[words]);
     }
     assert!(received(&peer, 0).is_empty());
     let log = scene.write("good.log", &commands(3));
     let other = Scene::new(SHORT);
-    replay(&other, &log, "--wait-s 0").wait().expect_code(3).expect_said(&["needs a host"]);
+    replay(&other, &log, "--wait-s 0").wait().expect_code(3).expect_stderr(&["needs a host"]);
 }

@@ -5,11 +5,11 @@ use runlog::timing::CycleTiming;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use system_tests::{Ended, Pace, Program, SHORT, Scene, json, run_both, timing_rows, turn};
+use system_tests::{CompletedProcess, Pace, Program, SHORT, Scene, json, run_both, timing_rows, turn};
 
 const FAULTS: &str = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\nfrom_s = 0.2\nto_s = 0.25\n";
 
-fn export(folder: &Path, out: &Path) -> Ended {
+fn export(folder: &Path, out: &Path) -> CompletedProcess {
     let bench = Program::Bench.start(&[&"export", &folder, &"--to", &"trace", &"--out", &out]);
     bench.wait().expect_code(0)
 }
@@ -164,7 +164,7 @@ fn a_trace_holds_every_cycle_with_its_stages_every_frame_and_every_fault() {
     }
 
     fs::remove_file(folder.join("controller.json")).expect("the report");
-    let said = export(&folder, &out).expect_said(&["controller-timing.csv: left out"]);
+    let said = export(&folder, &out).expect_stderr(&["controller-timing.csv: left out"]);
     assert!(said.stdout.contains(&format!("{} cycles, 2 marks", rig.len())), "{}", said.stdout);
 }
 
@@ -173,7 +173,7 @@ fn a_trace_without_timing_rows_has_the_frames_and_says_how_cycles_are_recorded()
     let scene = Scene::new(SHORT);
     let log = scene.write("some.log", "(2.000250) a 120#0011223344556677\n(1.000000) b 1ABCDEF0#01\n");
     let out = scene.path("some.json");
-    let said = export(&log, &out).expect_said(&["no cycles", "--full-timing"]);
+    let said = export(&log, &out).expect_stderr(&["no cycles", "--full-timing"]);
     assert!(said.stdout.contains("2 frames, 0 cycles, 0 marks"), "{}", said.stdout);
     let trace = json(&out);
     assert!(trace["otherData"]["cycle_zero_us"].is_null(), "a log alone does not tell");

@@ -17,14 +17,14 @@ use system_tests::{Pace, RESTLESS, Scene, both_good, count, count_of_id, turn};
 
 const WIRE: &str = "loss=0.01&seed=7";
 
-struct Counted {
+struct LossyRun {
     received: Vec<CanFrame>,
     host: Value,
     summary: Value,
     controller: Value,
 }
 
-impl Counted {
+impl LossyRun {
     fn injected(&self, id: &str) -> u64 {
         count_of_id(&self.host["injected_loss"], id)
     }
@@ -103,7 +103,7 @@ impl Counted {
     }
 }
 
-fn run_in_lockstep(wire: &str) -> (Scene, Counted) {
+fn run_in_lockstep(wire: &str) -> (Scene, LossyRun) {
     let scene = Scene::new(RESTLESS);
     let url = format!("{}?{wire}", scene.url());
     let emulator = scene.emulator(Pace::Lockstep).bus(url).with("--members 2 --seconds 4").start();
@@ -115,8 +115,8 @@ fn run_in_lockstep(wire: &str) -> (Scene, Counted) {
     controller.wait();
     let summary = scene.summary();
     let controller = scene.report();
-    let counted = Counted { received, host: summary["bus_host"].clone(), summary, controller };
-    (scene, counted)
+    let run = LossyRun { received, host: summary["bus_host"].clone(), summary, controller };
+    (scene, run)
 }
 
 #[test]
@@ -137,13 +137,13 @@ fn the_same_seed_loses_the_same_frames_and_another_seed_others() {
 
 #[test]
 fn without_loss_nobody_counts_any() {
-    let (_, counted) = run_in_lockstep("loss=0");
-    assert_eq!(counted.host["injected_loss"], Value::Object(serde_json::Map::new()));
+    let (_, run) = run_in_lockstep("loss=0");
+    assert_eq!(run.host["injected_loss"], Value::Object(serde_json::Map::new()));
     for pointer in ["/drive_commands/lost", "/load_commands/lost", "/frames_lost_at_rig"] {
-        assert_eq!(count(&counted.summary, pointer), 0, "{pointer}");
+        assert_eq!(count(&run.summary, pointer), 0, "{pointer}");
     }
     for axis in ["drive", "load"] {
-        assert_eq!(count(&counted.controller, &format!("/axes/{axis}/sensors_lost")), 0, "{axis}");
+        assert_eq!(count(&run.controller, &format!("/axes/{axis}/sensors_lost")), 0, "{axis}");
     }
 }
 
@@ -162,5 +162,5 @@ fn in_real_time_both_sums_agree_for_each_identifier() {
     let host = host.interrupt();
     let host: Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
     let (summary, controller) = (scene.summary(), scene.report());
-    Counted { received: trace.join().expect("the listener listens"), host, summary, controller }.check();
+    LossyRun { received: trace.join().expect("the listener listens"), host, summary, controller }.check();
 }

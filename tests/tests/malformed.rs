@@ -94,7 +94,7 @@ fn one_good_command_from_elsewhere_does_change_the_run() {
     let with = run(Some(&mut |peer, cycle| {
         if cycle == FIRST_CYCLE {
             let command = ValveCommand { opening: 1.0, alive: 5, echo: (cycle % 4096) as u16, enable: true };
-            peer.say(&Frame::DriveValveCommand(command));
+            peer.send_frame(&Frame::DriveValveCommand(command));
         }
     }));
     for file in FILES {
@@ -108,7 +108,7 @@ fn a_tick_from_elsewhere_is_counted_as_a_second_rig() {
     let scene = run(Some(&mut |peer, cycle| {
         if cycle == FIRST_CYCLE {
             let tick = Frame::Tick(Tick { cycle, lockstep: true, ..Tick::default() });
-            peer.say(&tick);
+            peer.send_frame(&tick);
         }
     }));
     let summary = scene.summary();

@@ -24,11 +24,11 @@ fn a_model_file_is_set_on_a_page_and_simulated_beside_a_record() {
     let record = file("record.csv", &format!("t_s,u,y\n{rows}"));
 
     let page = folder.path().join("lag.html");
-    discrepancy(&[&"explain", &model, &"--html", &page]).expect_code(GOOD).expect_printed(&["rate"]);
+    discrepancy(&[&"explain", &model, &"--html", &page]).expect_code(GOOD).expect_stdout(&["rate"]);
     let page = fs::read_to_string(page).expect("a page");
     assert!(page.contains("<math") && page.contains("</html>") && !page.contains("http://"), "{page}");
     let over = discrepancy(&[&"explain", &model, &"--html", &model]).expect_code(BAD_INPUT);
-    over.expect_said(&["it is read here: name another"]);
+    over.expect_stderr(&["it is read here: name another"]);
     assert_eq!(fs::read_to_string(&model).expect("the model file"), MODEL);
 
     let out = folder.path().join("simulated.csv");
@@ -41,5 +41,5 @@ fn a_model_file_is_set_on_a_page_and_simulated_beside_a_record() {
         assert!((said - value(row as i32)).abs() < 1e-5, "{line}");
     }
     let again = discrepancy(&[&"simulate", &model, &"--record", &record, &"--out", &out]);
-    again.expect_code(BAD_INPUT).expect_said(&["there is a file already"]);
+    again.expect_code(BAD_INPUT).expect_stderr(&["there is a file already"]);
 }

@@ -6,10 +6,10 @@ use protocol::response_time::rig::{RigAnalysis, RigFrame};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
-use system_tests::{Ended, LINKED, Pace, SHORT, Scene, bus_log, count, shipped_experiments, turn};
+use system_tests::{CompletedProcess, LINKED, Pace, SHORT, Scene, bus_log, count, shipped_experiments, turn};
 
 /// Runs emulator and controller over a bus with these options; the emulator ends well with the controllers, or after some time.
-fn run(scene: &Scene, pace: Pace, wire: &str, options: &str) -> (Value, Ended) {
+fn run(scene: &Scene, pace: Pace, wire: &str, options: &str) -> (Value, CompletedProcess) {
     let url = format!("{}?{wire}", scene.url());
     let emulator = scene.emulator(pace).bus(url).with(options).start();
     let controller = scene.controller(pace).start();
@@ -183,7 +183,7 @@ fn half_a_mbit_is_refused_with_the_arithmetic() {
         "use bitrate=1000000",
     ];
     let emulator = scene.emulator(Pace::Real).bus(format!("{}?bitrate=500000", scene.url())).start();
-    emulator.wait().expect_code(2).expect_said(&arithmetic);
+    emulator.wait().expect_code(2).expect_stderr(&arithmetic);
     assert!(!scene.path("emulator").exists(), "refused before anything is touched");
-    scene.start_bus_host("bitrate=500000").wait().expect_code(2).expect_said(&arithmetic);
+    scene.start_bus_host("bitrate=500000").wait().expect_code(2).expect_stderr(&arithmetic);
 }

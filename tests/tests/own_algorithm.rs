@@ -2,7 +2,7 @@
 
 use protocol::frames::{EmergencyStopReason, Frame};
 use system_tests::bus_cycles::by_cycle;
-use system_tests::{Ended, Pace, SHORT, Scene, own, turn};
+use system_tests::{CompletedProcess, Pace, SHORT, Scene, own, turn};
 
 /// A scene whose drive is controlled by the scene's own_algorithm.so.
 fn scene() -> Scene {
@@ -12,7 +12,7 @@ fn scene() -> Scene {
 }
 
 /// Runs in lockstep to the controller's end, whichever it is.
-fn run(scene: &Scene) -> Ended {
+fn run(scene: &Scene) -> CompletedProcess {
     let emulator = scene.emulator(Pace::Lockstep).with("--seconds 20").start();
     let ended = scene.controller(Pace::Lockstep).start().wait();
     emulator.wait();
@@ -44,7 +44,7 @@ fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the
     let scene = scene();
     own::failing(&scene, "count > 200 && ready->set_velocity_m_per_s > 0.1", &[]);
     let ended = run(&scene).expect_code(1);
-    ended.expect_said(&["stopped before the end: drive: controller-fault", "gave no number"]);
+    ended.expect_stderr(&["stopped before the end: drive: controller-fault", "gave no number"]);
     let table = scene.axis_table("drive");
     let (velocity, enabled) = (table.numbers("set_velocity_m_per_s"), table.numbers("enabled"));
     let failed = velocity.iter().position(|velocity| *velocity > 0.1).expect("it got that far");
@@ -72,7 +72,7 @@ fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the
 fn an_infinite_result_during_the_approach_is_latched_too() {
     let scene = scene();
     own::failing(&scene, "count == 300", &["-DRESULT=INFINITY"]);
-    run(&scene).expect_code(1).expect_said(&["drive: controller-fault"]);
+    run(&scene).expect_code(1).expect_stderr(&["drive: controller-fault"]);
     let table = scene.axis_table("drive");
     let fault = table.first("main_chain", "fault", 0);
     assert_eq!(table.states("main_chain"), ["waiting-for-rig", "initial-positioning", "fault"]);
@@ -88,7 +88,7 @@ fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
-    ended.expect_said(&["drive: controller-fault", "missed its time"]);
+    ended.expect_stderr(&["drive: controller-fault", "missed its time"]);
     let table = scene.axis_table("drive");
     let state = table.texts("main_chain")[table.first("main_chain", "fault", 0) - 1];
     assert_eq!(state, "initial-positioning", "latched where it became slow");
@@ -102,7 +102,7 @@ fn a_library_that_never_returns_ends_the_controller_with_what_was_recorded() {
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
-    ended.expect_said(&["has not returned for 2 s"]);
+    ended.expect_stderr(&["has not returned for 2 s"]);
     let report = scene.report();
     assert!(report["ended_because"].as_str().expect("a reason").contains("has not returned"));
     // All that was answered before is on disk.
@@ -116,8 +116,8 @@ fn a_library_of_another_version_is_refused_before_anything_runs() {
     own::failing(&scene, "0", &["-DVERSION=99"]);
     let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 1").start();
     let ended = scene.controller(Pace::Lockstep).start().wait().expect_code(2);
-    ended.expect_said(&["own_algorithm.so", "version", "99"]);
+    ended.expect_stderr(&["own_algorithm.so", "version", "99"]);
     assert!(!scene.path("controller/controller.json").exists(), "nothing ran");
     assert!(!scene.path("controller/controller-drive.csv").exists(), "nothing was made");
-    emulator.wait().expect_code(3).expect_said(&["not all members joined"]);
+    emulator.wait().expect_code(3).expect_stderr(&["not all members joined"]);
 }

@@ -7,11 +7,11 @@ use protocol::frames::{
     EmergencyStop, EmergencyStopReason, Frame, RunControl, RunControlCommand, ValveCommand,
 };
 use rustix::process::Signal;
-use system_tests::bus_cycles::{Logged, by_cycle};
+use system_tests::bus_cycles::{LoggedFrame, by_cycle};
 use system_tests::exit::BOUND_BROKEN;
 use system_tests::{
-    Ended, LINKED, Pace, Running, SHORT, Scene, bus_log_to_last_whole_line, count, events, json, run_both,
-    turn,
+    CompletedProcess, LINKED, Pace, Running, SHORT, Scene, bus_log_to_last_whole_line, count, events, json,
+    run_both, turn,
 };
 
 /// Range of the echo as rig.dbc has it, not as the code does.
@@ -29,25 +29,25 @@ fn long() -> String {
     LINKED.replace("duration_s = 0.5", "duration_s = 60.0")
 }
 
-struct Under {
+struct PairRun {
     scene: Scene,
     emulator: Running,
     failing: Running,
     other: Running,
 }
 
-impl Under {
+impl PairRun {
     /// Both controllers in the middle of the experiment.
-    fn way(pace: Pace, failing: &str, other: &str) -> Self {
+    fn in_experiment(pace: Pace, failing: &str, other: &str) -> Self {
         let scene = Scene::new(&long());
         let members = if pace == Pace::Lockstep { "--members 2" } else { "" };
         let emulator = scene.emulator(pace).with(members).start();
         let [failing, mut other] = [failing, other].map(|axis| scene.axis_controller(pace, axis).start());
         other.wait_for("experiment: ");
-        let mut under = Self { scene, emulator, failing, other };
-        under.scene.wait_for_more_rows("emulator", 600);
-        under.other.wait_for("experiment: ");
-        under
+        let mut run = Self { scene, emulator, failing, other };
+        run.scene.wait_for_more_rows("emulator", 600);
+        run.other.wait_for("experiment: ");
+        run
     }
 }
 
@@ -74,14 +74,14 @@ fn is_status(frame: &Frame, axis: &str) -> bool {
 /// Holds what the log says of an axis that was lost and of the other, which trips the emergency stop. The time is counted by the
 /// echoes of their commands, which name the rig's cycles also where some were skipped.
 #[track_caller]
-fn expect_lost(log: &[Logged], lost: &str, other: &str, grace: u64) {
+fn expect_lost(log: &[LoggedFrame], lost: &str, other: &str, grace: u64) {
     let tripped = log.iter().position(|logged| stop(&logged.frame, other).is_some());
     let tripped = tripped.unwrap_or_else(|| panic!("{other} never trips the emergency stop"));
     let call = stop(&log[tripped].frame, other).expect("found by it");
     assert_eq!(call, EmergencyStop { reason: EmergencyStopReason::PartnerLost, release: false });
     // The command of the same cycle stands before it or after it: on a bus the emergency stop goes first.
     let commands =
-        |of: &[Logged]| of.iter().filter_map(|logged| command(&logged.frame, other)).collect::<Vec<_>>();
+        |of: &[LoggedFrame]| of.iter().filter_map(|logged| command(&logged.frame, other)).collect::<Vec<_>>();
     let (before, after) = (commands(&log[..tripped]), commands(&log[tripped..]));
     assert!(before.len() > 1000 && after.len() > 1000, "{} and {} commands", before.len(), after.len());
     assert!(before[..before.len() - 1].iter().any(|command| command.enable), "{other} was under way");
@@ -105,15 +105,16 @@ fn expect_lost(log: &[Logged], lost: &str, other: &str, grace: u64) {
     assert!(since_death <= LOST_AT_LATEST + grace, "{lost} was given up {since_death} cycles after its end");
 }
 
-fn expect_partner_lost(ended: Ended, axis: &str) -> Ended {
+fn expect_partner_lost(ended: CompletedProcess, axis: &str) -> CompletedProcess {
     let named = format!("stopped before the end: {axis}: partner-lost");
-    ended.expect_code(BOUND_BROKEN).expect_said(&[named.as_str(), "fell silent for 100 ms"])
+    ended.expect_code(BOUND_BROKEN).expect_stderr(&[named.as_str(), "fell silent for 100 ms"])
 }
 
 #[test]
 fn a_controller_that_is_killed_is_noticed_by_the_other_which_shuts_its_valve_and_trips_the_emergency_stop() {
     for (lost, other) in PAIRS {
-        let Under { scene, emulator, failing, other: left } = Under::way(Pace::Lockstep, lost, other);
+        let PairRun { scene, emulator, failing, other: left } =
+            PairRun::in_experiment(Pace::Lockstep, lost, other);
         failing.kill();
         expect_partner_lost(left.wait(), other);
         // Two seconds after the fault nobody is left in the barrier.
@@ -139,12 +140,13 @@ fn a_controller_that_is_killed_is_noticed_by_the_other_which_shuts_its_valve_and
 fn a_controller_that_stands_still_is_noticed_by_the_other_and_ends_too_when_it_goes_on() {
     let _machine = turn::take();
     for (lost, other) in PAIRS {
-        let Under { scene, mut emulator, failing, other: left } = Under::way(Pace::Real, lost, other);
+        let PairRun { scene, mut emulator, failing, other: left } =
+            PairRun::in_experiment(Pace::Real, lost, other);
         failing.signal(Signal::STOP);
         emulator.wait_for("emergency stop");
         failing.signal(Signal::CONT);
         expect_partner_lost(left.wait(), other);
-        failing.wait().expect_code(BOUND_BROKEN).expect_said(&["stopped before the end"]);
+        failing.wait().expect_code(BOUND_BROKEN).expect_stderr(&["stopped before the end"]);
         emulator.interrupt();
         // In real time the last status may have been a cycle that was missed: one more period.
         expect_lost(&by_cycle(&scene.bus_log()), lost, other, 10);
@@ -158,7 +160,7 @@ fn a_controller_whose_partner_never_comes_gives_up_after_10_s_and_says_what_to_d
         let emulator = scene.emulator(Pace::Lockstep).start();
         let controller = scene.axis_controller(Pace::Lockstep, axis).start();
         let ended = controller.wait().expect_code(BOUND_BROKEN);
-        ended.expect_said(&["partner-missing", "was not heard", "start it, or use --alone"]);
+        ended.expect_stderr(&["partner-missing", "was not heard", "start it, or use --alone"]);
         emulator.wait();
         let table = scene.axis_table(axis);
         let fault = table.cycles()[table.first("main_chain", "fault", 0)];
@@ -180,7 +182,7 @@ fn alone_no_partner_is_waited_for_nor_missed() {
     assert!(count(&report, "/cycles_answered") > 1500);
     // Both axes of one process are never alone.
     let refused = scene.controller(Pace::Lockstep).with("--alone").start().wait();
-    refused.expect_code(2).expect_said(&["--alone needs --axis drive or --axis load"]);
+    refused.expect_code(2).expect_stderr(&["--alone needs --axis drive or --axis load"]);
 }
 
 #[test]
@@ -192,7 +194,7 @@ fn controllers_with_different_experiments_do_not_move_the_rig() {
     let load = scene.axis_controller(Pace::Lockstep, "load").experiment(&other).start();
     for controller in [drive, load] {
         let ended = controller.wait().expect_code(BOUND_BROKEN);
-        ended.expect_said(&["stopped before the end"]);
+        ended.expect_stderr(&["stopped before the end"]);
     }
     emulator.wait();
     let said = ["drive", "load"].map(|axis| {
@@ -222,7 +224,11 @@ fn frames_lost_on_the_wire_do_not_stop_a_run() {
 }
 
 /// Runs both controllers beside a console that says something in a cycle.
-fn with_console(experiment: &str, cycles: u32, say: impl FnMut(u32) -> Option<Frame>) -> (Scene, [Ended; 2]) {
+fn with_console(
+    experiment: &str,
+    cycles: u32,
+    say: impl FnMut(u32) -> Option<Frame>,
+) -> (Scene, [CompletedProcess; 2]) {
     let scene = Scene::new(experiment);
     let options = format!("--members 3 --seconds {}", f64::from(cycles) * 1e-3);
     let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
@@ -242,7 +248,7 @@ fn an_abort_by_the_console_stops_both_without_an_emergency_stop() {
     let say = |cycle| if cycle == ABORT { run_control(RunControlCommand::Abort, 0) } else { None };
     let (scene, ended) = with_console(&long(), 20_000, say);
     for ended in ended {
-        ended.expect_code(BOUND_BROKEN).expect_said(&["aborted: the console ended the run"]);
+        ended.expect_code(BOUND_BROKEN).expect_stderr(&["aborted: the console ended the run"]);
     }
     for axis in ["drive", "load"] {
         let table = scene.axis_table(axis);

@@ -3,10 +3,10 @@
 
 use std::process::Command;
 use system_tests::foreign_python::of;
-use system_tests::{Ended, Running, shipped_programs, turn, workspace};
+use system_tests::{CompletedProcess, Running, shipped_programs, turn, workspace};
 
 /// Lines of `pytest -v` that end in a word such as PASSED.
-fn ended_so(ended: &Ended, word: &str) -> Vec<String> {
+fn ended_so(ended: &CompletedProcess, word: &str) -> Vec<String> {
     let lines = ended.stdout.lines().filter(|line| line.contains(&format!(" {word}")));
     lines.map(|line| line.split_whitespace().next().expect("a name").to_owned()).collect()
 }
@@ -54,5 +54,5 @@ fn the_example_of_a_job_tests_can_software_at_a_rig_without_root_or_vcan() {
     let mut job = Command::new(folder.join("job.sh"));
     job.arg(workspace()).env("PYTHON", of("hil")).env("AIRBENCH_BIN_DIR", shipped_programs());
     let ended = Running::start("job.sh", &mut job).wait().expect_code(0);
-    ended.expect_printed(&["2 passed"]);
+    ended.expect_stdout(&["2 passed"]);
 }

@@ -4,7 +4,7 @@ use std::ffi::OsStr;
 use std::path::PathBuf;
 use std::process::Command;
 use system_tests::foreign_python::{light_path, of, tools_path};
-use system_tests::{Build, Ended, Program, Running, executable, firmware, turn, workspace};
+use system_tests::{Build, CompletedProcess, Program, Running, executable, firmware, turn, workspace};
 
 /// pytest in the environment of `python/`, with the programs as they ship.
 fn pytest() -> Command {
@@ -40,7 +40,7 @@ fn folder() -> PathBuf {
     workspace().join("python/tests/rig")
 }
 
-fn expect_all_passed(ended: Ended, least: usize) {
+fn expect_all_passed(ended: CompletedProcess, least: usize) {
     // pytest reports on standard output.
     eprint!("{}", ended.stdout);
     let ended = ended.expect_code(0);

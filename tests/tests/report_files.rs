@@ -3,7 +3,7 @@
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use system_tests::foreign_python::run_script;
-use system_tests::{Ended, Pace, Program, Running, SHORT, Scene, count, json, run_both, turn};
+use system_tests::{CompletedProcess, Pace, Program, Running, SHORT, Scene, count, json, run_both, turn};
 
 fn run(scene: &Scene) -> PathBuf {
     let _machine = turn::take();
@@ -12,7 +12,7 @@ fn run(scene: &Scene) -> PathBuf {
     out
 }
 
-fn report(folder: &Path, options: &[&str]) -> Ended {
+fn report(folder: &Path, options: &[&str]) -> CompletedProcess {
     let mut bench = Program::Bench.command();
     Running::start("bench report", bench.arg("report").arg(folder).args(options)).wait()
 }

@@ -19,20 +19,20 @@ const SEALED_RUNS: u64 = 20;
 /// Shorter texts of numbers stand anywhere by chance.
 const TELLING_DIGITS: usize = 12;
 
-/// What a run left: its folder, and what the programs said.
-struct Left {
+/// A run with a sealed file: its folder, and the output of its programs.
+struct SealedRun {
     scene: Scene,
-    said: String,
+    output: String,
 }
 
-impl Left {
+impl SealedRun {
     fn path(&self, name: &str) -> PathBuf {
         self.scene.path("run").join(name)
     }
 }
 
 /// A run of both programs with this sealed file, summed up as `scripts/run` does.
-fn run(sealed: &str, pace: Pace, options: &str) -> Left {
+fn run(sealed: &str, pace: Pace, options: &str) -> SealedRun {
     let scene = Scene::new(LIVELY);
     scene.write("sealed.toml", sealed);
     let folder = scene.path("run");
@@ -42,15 +42,15 @@ fn run(sealed: &str, pace: Pace, options: &str) -> Left {
         &scene.controller(pace).out(&folder).with("--repeat"),
     );
     let summary = Program::Bench.start(&[&"summary", &folder]).wait().expect_code(0);
-    let said =
+    let output =
         ended.iter().chain([&summary]).map(|ended| format!("{}{}", ended.stdout, ended.stderr)).collect();
-    Left { scene, said }
+    SealedRun { scene, output }
 }
 
 /// Every file of the folder and of those in it, but truth.csv, by the path in the folder; and what was said.
-fn outputs(left: &Left) -> BTreeMap<String, String> {
-    let mut texts = BTreeMap::from([("(said)".to_owned(), left.said.clone())]);
-    let (root, mut folders) = (left.scene.path("run"), vec![left.scene.path("run")]);
+fn outputs(run: &SealedRun) -> BTreeMap<String, String> {
+    let mut texts = BTreeMap::from([("(said)".to_owned(), run.output.clone())]);
+    let (root, mut folders) = (run.scene.path("run"), vec![run.scene.path("run")]);
     while let Some(folder) = folders.pop() {
         for entry in fs::read_dir(&folder).expect("a run's folder") {
             let path = entry.expect("an entry").path();
@@ -116,17 +116,17 @@ fn telling_numbers(effects: &[Switched]) -> Vec<String> {
 type Kind = (u16, usize);
 
 /// Kinds of the frames that the rig sends, in their order, and of all frames.
-fn frames(left: &Left) -> (Vec<Kind>, BTreeSet<Kind>) {
+fn frames(run: &SealedRun) -> (Vec<Kind>, BTreeSet<Kind>) {
     let of_rig =
         |id: u16| MESSAGES.iter().any(|message| message.id == id && message.sender == DRIVE_SENSORS.sender);
-    let frames = bus_log(&left.path("bus.log"));
+    let frames = bus_log(&run.path("bus.log"));
     let kinds =
         frames.iter().map(|frame| (frame.standard_id().expect("rig.dbc has no other"), frame.data().len()));
     (kinds.clone().filter(|(id, _)| of_rig(*id)).collect(), kinds.collect())
 }
 
-fn columns(left: &Left, file: &str) -> Vec<String> {
-    Table::read(&left.path(file)).names().to_vec()
+fn columns(run: &SealedRun, file: &str) -> Vec<String> {
+    Table::read(&run.path(file)).names().to_vec()
 }
 
 #[test]
@@ -227,9 +227,9 @@ fn an_experiment_may_name_the_sealed_file_and_no_controller_reads_it() {
     expect_same(&open, &sealed, &["emulator/bus.log"], "differs");
     // A file that is not there stops the rig and not the controllers, which end for want of a rig.
     scene.write("experiment.toml", &named.replacen("mine", "gone", 1));
-    scene.emulator(Pace::Lockstep).start().wait().expect_code(2).expect_said(&["cannot read", "gone.toml"]);
+    scene.emulator(Pace::Lockstep).start().wait().expect_code(2).expect_stderr(&["cannot read", "gone.toml"]);
     let refused = scene.rehearsal().start().wait().expect_code(2);
-    refused.expect_said(&["rig.sealed", "must not read a sealed file", "emulator run"]);
+    refused.expect_stderr(&["rig.sealed", "must not read a sealed file", "emulator run"]);
 }
 
 #[test]
@@ -271,7 +271,7 @@ fn a_wrong_seal_is_refused_before_the_run_with_file_line_and_key() {
     for (text, words) in wrong {
         let file = scene.write("wrong.toml", text);
         let launch = scene.emulator(Pace::Real).with(&format!("--sealed {}", file.display()));
-        launch.start().wait().expect_code(2).expect_said(&[&format!("{}{words}", file.display())]);
+        launch.start().wait().expect_code(2).expect_stderr(&[&format!("{}{words}", file.display())]);
         assert!(!scene.path("emulator").exists(), "nothing is left of a run that never was");
     }
 }

@@ -15,7 +15,7 @@ const CYCLES: u64 = 4000;
 
 /// What the controllers did, by the rig's cycles.
 #[derive(Debug, Default)]
-struct Received {
+struct Reactions {
     stop: Option<(u64, EmergencyStop)>,
     /// The other axis says that it aborted.
     aborted: Option<u64>,
@@ -33,16 +33,16 @@ fn publish(peer: &Peer, cycle: u64, silent: Option<&str>, emergency_stop: bool) 
         ..Sensors::default()
     };
     if silent != Some("drive") {
-        peer.say(&Frame::DriveSensors(sensors));
+        peer.send_frame(&Frame::DriveSensors(sensors));
     }
     if silent != Some("load") {
-        peer.say(&Frame::LoadSensors(Sensors { position_m: 0.5, ..sensors }));
+        peer.send_frame(&Frame::LoadSensors(Sensors { position_m: 0.5, ..sensors }));
     }
     if cycle.is_multiple_of(10) {
-        peer.say(&Frame::Tick(Tick { cycle: cycle as u32, ..Tick::default() }));
+        peer.send_frame(&Frame::Tick(Tick { cycle: cycle as u32, ..Tick::default() }));
     }
     if cycle % 10 == 5 {
-        peer.say(&Frame::RigStatus(RigStatus {
+        peer.send_frame(&Frame::RigStatus(RigStatus {
             supply_pressure_pa: 7e5,
             emergency_stop,
             ..RigStatus::default()
@@ -51,33 +51,33 @@ fn publish(peer: &Peer, cycle: u64, silent: Option<&str>, emergency_stop: bool) 
 }
 
 /// Plays the rig; `silent` names the axis whose sensors stop.
-fn play(peer: &Peer, silent: &str) -> Received {
-    let mut received = Received::default();
+fn play(peer: &Peer, silent: &str) -> Reactions {
+    let mut reactions = Reactions::default();
     for cycle in 0..CYCLES {
-        publish(peer, cycle, (cycle >= SILENT_FROM).then_some(silent), received.stop.is_some());
+        publish(peer, cycle, (cycle >= SILENT_FROM).then_some(silent), reactions.stop.is_some());
         loop {
             let Some(packet) = peer.receive(if cycle == 0 { PATIENCE } else { Duration::from_secs(2) })
             else {
                 // The controllers have ended: two seconds after the fault.
-                return received;
+                return reactions;
             };
             let Packet::Frame(frame) = packet else { continue };
             match (silent, Frame::decode(&frame)) {
                 ("drive", Ok(Frame::DriveEmergencyStop(stop)))
                 | ("load", Ok(Frame::LoadEmergencyStop(stop))) => {
-                    received.stop = received.stop.or(Some((cycle, stop)));
+                    reactions.stop = reactions.stop.or(Some((cycle, stop)));
                 }
                 ("drive", Ok(Frame::LoadChainStatus(status)))
                 | ("load", Ok(Frame::DriveChainStatus(status)))
                     if status.main_chain == MainChainState::Aborted =>
                 {
-                    received.aborted = received.aborted.or(Some(cycle));
+                    reactions.aborted = reactions.aborted.or(Some(cycle));
                 }
                 ("drive", Ok(Frame::DriveValveCommand(command)))
                 | ("load", Ok(Frame::LoadValveCommand(command)))
                     if cycle > SILENT_FROM && command.enable =>
                 {
-                    received.opened.push(cycle);
+                    reactions.opened.push(cycle);
                 }
                 ("drive", Ok(Frame::LoadValveCommand(command)))
                 | ("load", Ok(Frame::DriveValveCommand(command)))
@@ -89,7 +89,7 @@ fn play(peer: &Peer, silent: &str) -> Received {
             }
         }
     }
-    received
+    reactions
 }
 
 #[test]
@@ -100,17 +100,17 @@ fn an_axis_without_sensors_trips_the_emergency_stop_after_five_ticks_of_the_rig(
         let rig = scene.peer();
         let controller = scene.controller(Pace::Real).with("--no-realtime --bus-grace 60").start();
         scene.wait_for_peers(2);
-        let received = play(&rig, silent);
+        let reactions = play(&rig, silent);
         let ended = controller.wait().expect_code(1);
-        ended.expect_said(&[&format!("stopped before the end: {silent}: sensor-loss")]);
-        let (cycle, stop) = received.stop.expect("it trips the emergency stop");
+        ended.expect_stderr(&[&format!("stopped before the end: {silent}: sensor-loss")]);
+        let (cycle, stop) = reactions.stop.expect("it trips the emergency stop");
         assert_eq!((stop.reason, stop.release), (EmergencyStopReason::SensorLoss, false), "{silent}");
         eprintln!("{silent}: emergency stop {} cycles after the last sensors", cycle - SILENT_FROM + 1);
         assert!((AT_EARLIEST..=AT_LATEST).contains(&cycle), "{silent}: in cycle {cycle}");
         // By the stop itself, not by the rig's status five cycles after the tick.
-        let aborted = received.aborted.expect("the other axis aborts");
+        let aborted = reactions.aborted.expect("the other axis aborts");
         assert!(aborted - cycle <= 2, "{silent}: the other axis aborts {} cycles later", aborted - cycle);
-        assert!(received.opened.is_empty(), "{silent}: opened without sensors in {:?}", received.opened);
+        assert!(reactions.opened.is_empty(), "{silent}: opened without sensors in {:?}", reactions.opened);
         let report = scene.report();
         assert_eq!(report["axes"][silent]["chain_state"], "fault");
         let other = if silent == "drive" { "load" } else { "drive" };

@@ -31,7 +31,7 @@ fn led(experiment: &str, asks: &[HandSetPoint]) -> [Vec<f64>; 2] {
         }
         if began.is_some_and(|began| cycle == began + 100) {
             for ask in asks {
-                peer.say(&Frame::HandSetPoint(*ask));
+                peer.send_frame(&Frame::HandSetPoint(*ask));
             }
         }
     });

@@ -6,11 +6,11 @@ use std::fs;
 use std::path::Path;
 use system_tests::foreign_python::tools_path;
 use system_tests::socketcan::{self, built, expected, guest, start};
-use system_tests::{Ended, Running, SHORT, Scene, shipped_programs, turn, wait_until, workspace};
+use system_tests::{CompletedProcess, Running, SHORT, Scene, shipped_programs, turn, wait_until, workspace};
 
 /// What a program prints, on a bus of its own.
 #[track_caller]
-fn output_of(scene: &Scene, program: &Path) -> Ended {
+fn output_of(scene: &Scene, program: &Path) -> CompletedProcess {
     start(scene, "--pair", &[&program, &"vcan0"]).wait()
 }
 
@@ -21,8 +21,8 @@ fn answers_as_on_vcan(program: &Path) {
     assert_eq!(difference, None, "{}", answered.stderr);
     let dropped =
         format!("{} messages of the program were accepted and dropped", socketcan::DIFFERENCES.len());
-    let answered = answered.expect_code(0).expect_said(&[&dropped, "kernel answers: No such device"]);
-    answered.expect_said(&["CAN_TP16 is not served"]);
+    let answered = answered.expect_code(0).expect_stderr(&[&dropped, "kernel answers: No such device"]);
+    answered.expect_stderr(&["CAN_TP16 is not served"]);
 }
 
 #[test]
@@ -122,7 +122,7 @@ fn sockets_are_told_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan(
     wait_until("the answers", || running.stdout().contains("all is seen"));
     let _host = scene.bus_host("");
     let ended = running.wait().expect_code(0);
-    let expected = socketcan::recorded_but_for("down.txt", &socketcan::DIFFERENCES_WHEN_DOWN);
+    let expected = socketcan::recorded_except("down.txt", &socketcan::DIFFERENCES_WHEN_DOWN);
     assert_eq!(socketcan::first_difference(&ended.stdout, &expected), None, "{}", ended.stderr);
 }
 
@@ -146,7 +146,7 @@ fn a_listener_is_told_that_the_bus_went_down_as_on_vcan() {
     let ended = told.wait();
     let recorded = fs::read_to_string(expected().join("can-utils/down")).unwrap();
     assert!(recorded.starts_with("read: Network is down\ncandump 1\n"), "{recorded}");
-    ended.expect_code(1).expect_said(&["read: Network is down", "vcan0 is down"]);
+    ended.expect_code(1).expect_stderr(&["read: Network is down", "vcan0 is down"]);
 }
 
 /// The page's table of system calls against the filter and the tests: every call that is answered stands in it, and every row

@@ -41,7 +41,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     let crowd = start(&scene, "", &[&built("many-sockets"), &"vcan0", &"100", &"10"]);
     scene.wait_for_more_rows("emulator", GOES_ON);
     let crowd = crowd.wait().expect_code(0);
-    crowd.expect_printed(&["1000 sockets, each has received"]);
+    crowd.expect_stdout(&["1000 sockets, each has received"]);
 
     assert!(listener.stdout().lines().count() > 200);
     drop(listener);
@@ -63,7 +63,7 @@ fn a_flood_through_it_arrives_whole_and_in_order() {
     let sender = start(&scene, "", &[&flow, &"send", &"vcan0", &"20000", &"4000"]);
     sender.wait().expect_code(0);
     let received = pair.wait().expect_code(0);
-    received.expect_printed(&["out of order 0"]);
+    received.expect_stdout(&["out of order 0"]);
     let told = |what: &str| -> u64 {
         let after = received.stdout.split(what).nth(1).unwrap_or_else(|| panic!("{}", received.stdout));
         after.split(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
@@ -204,7 +204,7 @@ const HURRIED: &str = include_str!("../python/guests/closes_in_a_message.py");
 fn a_sender_that_does_not_wait_leaves_the_message_of_a_closed_socket_whole() {
     let scene = Scene::new(SHORT);
     let ended = start_python(&scene, "--pair", HURRIED).wait().expect_code(0);
-    ended.expect_printed(&["second waits its turn", "sendmmsg of none 0", "recvmmsg for one EAGAIN"]);
+    ended.expect_stdout(&["second waits its turn", "sendmmsg of none 0", "recvmmsg for one EAGAIN"]);
 }
 
 const ORPHAN: &str = include_str!("../python/guests/outlives_bench_can.py");

@@ -33,7 +33,7 @@ fn python_can_sends_filters_repeats_and_listens() {
         }
     }
     let ended = running.wait().expect_code(0);
-    ended.expect_printed(&[
+    ended.expect_stdout(&[
         "a limited task ends after 5",
         "a notifier hears all",
         "no CAN FD",
@@ -68,7 +68,7 @@ fn scripts_run_takes_the_interface_for_a_bus() {
     let command: [&dyn AsRef<OsStr>; 6] = [&run, &"--bus", &"can://vcan0", &"--out", &out, &experiment];
     let mut can = guest(&scene, "--pair", &command);
     let ended = Running::start("scripts/run", can.env("AIRBENCH_BIN_DIR", shipped_programs())).wait();
-    ended.expect_printed(&["can://vcan0"]);
+    ended.expect_stdout(&["can://vcan0"]);
     let summary = json(&out.join("summary.json"));
     let commands = count(&summary, "/drive_commands/accepted");
     assert!(commands > 500, "{commands} commands: {}", ended.stderr);
@@ -92,7 +92,7 @@ fn two_foreign_programs_meet_on_a_bus_without_a_rig() {
     }
     listener.wait().expect_code(0);
     let ended = pair.interrupt();
-    ended.expect_said(&["the bus carried", "0 did not fit"]);
+    ended.expect_stderr(&["the bus carried", "0 did not fit"]);
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn canbusload_and_cansniffer_show_the_traffic() {
         words.first() == Some(&"vcan0@500000") && words.get(1).is_some_and(|frames| *frames != "0")
     };
     assert!(ended.stdout.lines().any(busy), "{}", ended.stdout);
-    ended.expect_printed(&["5A5"]);
+    ended.expect_stdout(&["5A5"]);
 }
 
 #[test]
@@ -168,14 +168,14 @@ fn it_works_for_an_ordinary_user_without_capabilities_and_in_a_user_namespace() 
         let mut probe = Command::new(way[0]);
         if !probe.args(&way[1..]).arg("true").output().is_ok_and(|ended| ended.status.success()) {
             let name = "it_works_for_an_ordinary_user_without_capabilities_and_in_a_user_namespace";
-            system_tests::skip::tell(name, "unshare --user is not permitted here");
+            system_tests::skip::report(name, "unshare --user is not permitted here");
             continue;
         }
         let url = format!("unix://{}/bus{number}", folder.path().display());
         let mut command = Command::new(way[0]);
         command.args(&way[1..]).arg(&bench).args(["can", "--pair", "--bus", &url, "--", "sh", "-c", line]);
         let ended = Running::start("bench can", command.current_dir(folder.path())).wait().expect_code(0);
-        ended.expect_printed(&["123   [1]  42"]);
+        ended.expect_stdout(&["123   [1]  42"]);
     }
 }
 
@@ -209,24 +209,24 @@ fn what_was_written_last_reaches_the_bus_when_the_program_has_ended() {
     for _ in 0..10 {
         can(&["--", "cangen", "vcan0", "-n", "200", "-g", "0", "-I", "7F6"]).wait().expect_code(0);
     }
-    pair.interrupt().expect_said(&["the bus carried 2000 frames"]);
+    pair.interrupt().expect_stderr(&["the bus carried 2000 frames"]);
 }
 
 #[test]
 fn what_cannot_be_is_said_with_what_to_do() {
     let scene = Scene::new(SHORT);
     let absent = Running::start("no host", &mut guest(&scene, "--wait-s 0", &["true"])).wait().expect_code(3);
-    absent.expect_said(&["no host at", "emulator run", "--pair"]);
+    absent.expect_stderr(&["no host at", "emulator run", "--pair"]);
     let bench = executable(Program::Bench, Build::Shipped);
     let inner = scene.url();
     let nested =
         [bench.as_os_str(), "can".as_ref(), "--bus".as_ref(), inner.as_ref(), "--".as_ref(), "true".as_ref()];
     let nested = Running::start("nested", &mut guest(&scene, "--pair", &nested)).wait().expect_code(2);
-    nested.expect_said(&["does not nest"]);
+    nested.expect_stderr(&["does not nest"]);
     let missing = Running::start("missing", &mut guest(&scene, "--pair", &["/no/such/program"])).wait();
-    missing.expect_code(2).expect_said(&["cannot start the command"]);
+    missing.expect_code(2).expect_stderr(&["cannot start the command"]);
     let kernels = Program::Bench.start(&[&"can", &"--bus", &"can://vcan0", &"--", &"true"]).wait();
-    kernels.expect_code(2).expect_said(&["embedded buses"]);
+    kernels.expect_code(2).expect_stderr(&["embedded buses"]);
 }
 
 /// As in a container: Docker's default profile refuses the second to whoever has no CAP_SYS_PTRACE.
@@ -242,7 +242,7 @@ fn a_sandbox_that_forbids_it_is_told_with_what_to_allow() {
         command.arg(call.to_string()).arg(&bench);
         command.args(["can", "--pair", "--bus", &scene.url(), "--", "true"]);
         let refused = Running::start("bench can", &mut command).wait().expect_code(2);
-        refused.expect_said(&[advice]);
+        refused.expect_stderr(&[advice]);
     }
 }
 
@@ -289,7 +289,7 @@ fn its_exit_code_is_the_programs_and_a_signal_goes_to_the_program() {
     );
     running.wait_for("ready");
     running.signal(Signal::TERM);
-    running.wait().expect_code(9).expect_said(&["asked"]);
+    running.wait().expect_code(9).expect_stderr(&["asked"]);
     let killed = shell(&scene, "--pair", "kill -KILL $$").wait();
     killed.expect_code(128 + 9);
 }

@@ -4,7 +4,7 @@ use runlog::telemetry::Packet;
 use serde_json::{Value, json as value};
 use std::os::unix::fs::PermissionsExt;
 use system_tests::events::{all, times};
-use system_tests::onlooker::{Told, Viewer};
+use system_tests::onlooker::{ReceivedTelemetry, Viewer};
 use system_tests::{Launch, Pace, RESTLESS, SHORT, Scene, Table, both_good, expect_same, json, turn};
 
 fn with_telemetry(scene: &Scene, pace: Pace) -> Launch {
@@ -16,7 +16,7 @@ fn viewer(scene: &Scene) -> Viewer {
 }
 
 /// Compares what a viewer received with the tables, cell by cell and to the bit.
-fn expect_rows_of_the_files(scene: &Scene, reported: &Told) {
+fn expect_rows_of_the_files(scene: &Scene, reported: &ReceivedTelemetry) {
     let tables =
         ["measurement", "truth"].map(|name| Table::read(&scene.path(&format!("emulator/{name}.csv"))));
     let columns: Vec<Vec<f64>> = reported.description["columns"]
@@ -142,7 +142,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
     let scene = Scene::new(RESTLESS);
     let emulator = with_telemetry(&scene, Pace::Real).with("--seconds 60").start();
     let mut one = viewer(&scene);
-    let refused = one.ask("stop");
+    let refused = one.request("stop");
     assert_eq!(refused["ok"], false);
     assert!(refused["text"].as_str().is_some_and(|text| text.contains("--console")), "{refused}");
     drop(one);
@@ -153,9 +153,9 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
 
     let emulator = with_telemetry(&scene, Pace::Real).with("--seconds 60 --console").start();
     let mut one = viewer(&scene);
-    assert_eq!(one.ask("weights 3"), value!({ "ok": true, "text": "" }));
-    assert!(one.ask("help")["text"].as_str().is_some_and(|help| help.contains("unlink")));
-    let refused = one.ask("weights 300");
+    assert_eq!(one.request("weights 3"), value!({ "ok": true, "text": "" }));
+    assert!(one.request("help")["text"].as_str().is_some_and(|help| help.contains("unlink")));
+    let refused = one.request("weights 300");
     assert!(
         refused["ok"] == false && refused["text"] == "weights '300': allowed are 0 to 20 kg",
         "{refused}"
@@ -168,7 +168,7 @@ fn commands_are_obeyed_with_a_console_and_refused_without() {
         _ => None,
     });
     assert_eq!(received.expect("the event")["text"], "weights on the carriage: 3 kg");
-    assert_eq!(one.ask("quit")["ok"], true);
+    assert_eq!(one.request("quit")["ok"], true);
     emulator.wait().expect_code(0);
     assert!(!scene.path("telemetry").exists(), "the socket went with the run");
 }
@@ -200,6 +200,6 @@ fn a_socket_that_cannot_be_had_is_refused_before_the_run() {
         .start()
         .wait()
         .expect_code(2)
-        .expect_said(&["cannot open telemetry", "choose another path with --telemetry"]);
+        .expect_stderr(&["cannot open telemetry", "choose another path with --telemetry"]);
     assert_eq!(std::fs::read_to_string(path).expect("it is left as it was"), "a file of somebody's own");
 }

@@ -10,7 +10,7 @@ use system_tests::{AxisTable, LINKED, Pace, SHORT, Scene, bus_log, expect_same, 
 const TABLES: [&str; 4] = ["measurement.csv", "truth.csv", "controller-drive.csv", "controller-load.csv"];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Cast {
+enum ProcessSetup {
     OneProcess,
     DriveFirst,
     LoadFirst,
@@ -18,16 +18,16 @@ enum Cast {
 }
 
 /// Runs the experiment to its end, everything into one folder, as `scripts/run` does.
-fn run(experiment: &str, cast: Cast) -> Scene {
+fn run(experiment: &str, setup: ProcessSetup) -> Scene {
     let scene = Scene::new(experiment);
     let out = scene.path("run");
-    if cast == Cast::Rehearsal {
+    if setup == ProcessSetup::Rehearsal {
         scene.rehearsal().out(&out).with_shipped_programs().start().wait().expect_code(0);
         return scene;
     }
-    let axes: &[&str] = match cast {
-        Cast::OneProcess => &["both"],
-        Cast::LoadFirst => &["load", "drive"],
+    let axes: &[&str] = match setup {
+        ProcessSetup::OneProcess => &["both"],
+        ProcessSetup::LoadFirst => &["load", "drive"],
         _ => &["drive", "load"],
     };
     let emulator =
@@ -49,13 +49,13 @@ fn run(experiment: &str, cast: Cast) -> Scene {
 
 /// Holds all four ways against each other. Returns the run of one process.
 fn expect_all_the_same(experiment: &str) -> Scene {
-    let one = run(experiment, Cast::OneProcess);
-    for cast in [Cast::DriveFirst, Cast::LoadFirst] {
-        let two = run(experiment, cast);
+    let one = run(experiment, ProcessSetup::OneProcess);
+    for setup in [ProcessSetup::DriveFirst, ProcessSetup::LoadFirst] {
+        let two = run(experiment, setup);
         let files = [&TABLES[..], &["bus.log"]].concat();
-        expect_same(&one.path("run"), &two.path("run"), &files, &format!("differs, {cast:?}"));
+        expect_same(&one.path("run"), &two.path("run"), &files, &format!("differs, {setup:?}"));
     }
-    let rehearsal = run(experiment, Cast::Rehearsal);
+    let rehearsal = run(experiment, ProcessSetup::Rehearsal);
     expect_same(&one.path("run"), &rehearsal.path("run"), &TABLES, "differs, rehearsed");
     assert!(!rehearsal.path("run/bus.log").exists(), "a rehearsal has no bus");
     one
@@ -107,7 +107,7 @@ fn an_axis_that_the_experiment_leaves_out_is_the_same_in_one_process_in_two_and_
 
 #[test]
 fn a_process_for_each_axis_leaves_a_report_of_its_own() {
-    let two = run(SHORT, Cast::DriveFirst);
+    let two = run(SHORT, ProcessSetup::DriveFirst);
     for (axis, other) in [("drive", "load"), ("load", "drive")] {
         let report = json(&two.path("run").join(format!("controller-{axis}.json")));
         assert_eq!(report["axes"][axis]["chain_state"], "done");

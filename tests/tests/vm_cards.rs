@@ -120,7 +120,7 @@ fn candump_agrees(guest: &Guest, run: &Path) {
 }
 
 /// Both programs' files of a run on the cards, what the interfaces counted, and what candump saw on `can1`.
-struct OnCards {
+struct CardRun {
     summary: Value,
     controller: Value,
     can0: InterfaceCounters,
@@ -131,7 +131,7 @@ struct OnCards {
     logged: u64,
 }
 
-impl OnCards {
+impl CardRun {
     fn read(guest: &Guest, run: &Path) -> Self {
         let log = guest.lines_of_run(LOG_OF_CAN1, run);
         // candump writes an error frame with the flag's eight digits, 2 or 3 first.
@@ -178,7 +178,7 @@ impl OnCards {
 }
 
 fn every_frame_on_the_cards_is_accounted_for(guest: &Guest, run: &Path) {
-    let on = OnCards::read(guest, run);
+    let on = CardRun::read(guest, run);
     eprintln!("{}: {:?} {:?}", run.display(), on.can0, on.can1);
     assert!(count(&on.summary, "/cycles") > 5000);
     let (from_rig, from_controllers) = on.heard_by_sender();
@@ -327,7 +327,7 @@ fn kinds_of_events(summary: &Value) -> String {
 }
 
 fn frames_around_the_disturbances_are_accounted_for(guest: &Guest, run: &Path) {
-    let on = OnCards::read(guest, run);
+    let on = CardRun::read(guest, run);
     eprintln!("{}: {:?} {:?}", run.display(), on.can0, on.can1);
     let (from_can0, from_controllers) = on.heard_by_sender();
     let (foreign, _) = sent_and_refused_by_cangen(run);

@@ -14,7 +14,7 @@ use system_tests::{
 };
 
 /// Emulator and controller of a scene, watched with controls.
-struct Watched {
+struct WatchedRun {
     scene: Scene,
     emulator: Running,
     controller: Running,
@@ -27,7 +27,7 @@ fn emulator(scene: &Scene) -> Running {
     scene.emulator(Pace::Real).with(&options).start()
 }
 
-impl Watched {
+impl WatchedRun {
     /// Under way: rows of the charts come.
     fn start(experiment: &str, options: &str) -> Self {
         let scene = Scene::new(experiment);
@@ -57,7 +57,7 @@ fn numbers(values: &Value) -> Vec<f64> {
 #[test]
 fn a_run_is_told_by_description_state_history_events_and_metrics() {
     let _machine = turn::take();
-    let watched = Watched::start(RESTLESS, "");
+    let watched = WatchedRun::start(RESTLESS, "");
     let page = &watched.page;
     assert_eq!(page.token, "", "there is nothing to be allowed to do");
 
@@ -234,7 +234,7 @@ fn only_who_may_gives_orders() {
 #[test]
 fn orders_reach_rig_controllers_and_folder() {
     let _machine = turn::take();
-    let watched = Watched::start(LINKED, "--control");
+    let watched = WatchedRun::start(LINKED, "--control");
     let page = &watched.page;
     let order = |order: Value| page.order(&order);
     let mut events = page.events();
@@ -307,7 +307,7 @@ fn orders_reach_rig_controllers_and_folder() {
 #[test]
 fn viewers_that_hang_or_talk_nonsense_cost_nobody_anything() {
     let _machine = turn::take();
-    let mut watched = Watched::start(RESTLESS, "--clients 20");
+    let mut watched = WatchedRun::start(RESTLESS, "--clients 20");
     // One that asks for everything and reads nothing, one that never finishes its request, one that only connects.
     let host = watched.page.address;
     let mut hangs = watched.page.connect();
@@ -336,7 +336,7 @@ fn viewers_that_hang_or_talk_nonsense_cost_nobody_anything() {
 #[test]
 fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() {
     let _machine = turn::take();
-    let mut watched = Watched::start(RESTLESS, "--control");
+    let mut watched = WatchedRun::start(RESTLESS, "--control");
     let mut events = watched.page.events();
     watched.emulator.signal(Signal::INT);
     events.wait_for("status", |status| status["telemetry"] == "gone");
@@ -350,7 +350,7 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     let rows = events.wait_for("rows", |_| true);
     assert!(rows["t_s"][0].as_f64() < Some(5.0), "time begins anew: {rows}");
 
-    let Watched { scene, emulator, controller, page } = watched;
+    let WatchedRun { scene, emulator, controller, page } = watched;
     let mut page = page;
     page.running().signal(Signal::KILL);
     scene.wait_for_more_rows("emulator", 500);

@@ -5,7 +5,7 @@
 
 use serde_json::Value;
 use std::collections::BTreeMap;
-use system_tests::xcp::{Foreign, config, wait_for_a2l, xcp_packet};
+use system_tests::xcp::{PyXcpClient, config, wait_for_a2l, xcp_packet};
 use system_tests::{AxisTable, Pace, RESTLESS, Running, Scene, count, turn};
 
 /// pyXCP takes its time to start, on a busy machine more than a controller waits for those that are missing.
@@ -63,7 +63,7 @@ fn pyxcp_reads_writes_is_refused_measures_without_a_gap_and_triggers() {
     let options = format!("--repeat --xcp {} {PATIENT}", config.display());
     let controller = scene.controller(Pace::Lockstep).with(&options).start();
     wait_for_a2l(&scene, "controller", "drive");
-    let seen = Foreign::start(&scene, "whole", "controller", "drive", true).wait();
+    let seen = PyXcpClient::start(&scene, "whole", "controller", "drive", true).wait();
     end(emulator, vec![controller]);
     let drive = scene.axis_table("drive");
 
@@ -157,7 +157,7 @@ fn two_processes_are_measured_at_once_each_under_identifiers_of_its_own() {
     let controllers: Vec<_> =
         axes.iter().map(|axis| scene.axis_controller(Pace::Lockstep, axis).with(&options).start()).collect();
     axes.iter().for_each(|axis| wait_for_a2l(&scene, "controller", axis));
-    let clients = axes.map(|axis| Foreign::start(&scene, "measure", "controller", axis, true));
+    let clients = axes.map(|axis| PyXcpClient::start(&scene, "measure", "controller", axis, true));
     for (client, axis) in clients.into_iter().zip(axes) {
         let seen = client.wait();
         let epk = seen["identity"]["epk"].as_str().expect("a text");
@@ -190,7 +190,7 @@ fn in_real_time_every_cycle_that_was_answered_in_10_s_was_measured() {
     let controller = scene.controller(Pace::Real).with(&options).start();
     wait_for_a2l(&scene, "controller", "drive");
     scene.wait_for_rows("emulator", 100);
-    let seen = Foreign::start(&scene, "watch", "controller", "drive", false).wait();
+    let seen = PyXcpClient::start(&scene, "watch", "controller", "drive", false).wait();
     end(emulator, vec![controller]);
     let drive = scene.axis_table("drive");
     let rows = daq_rows(&seen["daq"]);

@@ -244,7 +244,7 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
         let _ = scene.write("set.toml", &printed.replacen(from, to, 1));
         let place = format!("set.toml:{line}:");
         let ended = scene.rehearsal().with(&options).start().wait().expect_code(2);
-        ended.expect_said(&words).expect_said(&[&place]);
+        ended.expect_stderr(&words).expect_stderr(&[&place]);
     }
 }
 
@@ -266,7 +266,7 @@ fn a_configuration_that_cannot_be_used_is_refused_before_anything_moves() {
     {
         let config = scene.write("bad.toml", text);
         let launch = scene.controller(Pace::Real).with(&format!("--xcp {}", config.display()));
-        launch.start().wait().expect_code(2).expect_said(&["bad.toml", words]);
+        launch.start().wait().expect_code(2).expect_stderr(&["bad.toml", words]);
     }
     scene.controller(Pace::Real).with("--xcp nowhere.toml").start().wait().expect_code(2);
 }

@@ -3,7 +3,7 @@
 
 use plant::effects::sheet::Switched;
 use system_tests::Scene;
-use system_tests::hidden::{Extreme, LIVELY, Live, drawn, everything, live};
+use system_tests::hidden::{Extreme, LIVELY, LoopTiming, drawn, everything, live};
 
 /// Each slice, s.
 const SECONDS: u32 = 10;
@@ -18,7 +18,7 @@ fn main() {
         ("all at all places, largest drawn", everything(Extreme::Drawn)),
         ("all at all places, ends of their ranges", everything(Extreme::Mixed)),
     ];
-    let mut slices: Vec<Vec<Live>> = vec![Vec::new(); kinds.len()];
+    let mut slices: Vec<Vec<LoopTiming>> = vec![Vec::new(); kinds.len()];
     for _ in 0..ROUNDS {
         for (slices, (_, effects)) in slices.iter_mut().zip(&kinds) {
             slices.push(live(&Scene::new(LIVELY), effects, SECONDS));
@@ -29,8 +29,8 @@ fn main() {
          whole cycle p50 / p99, us |\n|---|---:|---:|---:|---:|---:|---:|"
     );
     for (slices, (name, _)) in slices.iter().zip(&kinds) {
-        let sum = |of: fn(&Live) -> u64| slices.iter().map(of).sum::<u64>();
-        let middle = |of: fn(&Live) -> [u64; 2]| {
+        let sum = |of: fn(&LoopTiming) -> u64| slices.iter().map(of).sum::<u64>();
+        let middle = |of: fn(&LoopTiming) -> [u64; 2]| {
             let [p50_us, p99_us] = [0, 1].map(|percentile| {
                 let mut values: Vec<u64> = slices.iter().map(|live| of(live)[percentile]).collect();
                 values.sort_unstable();

@@ -25,12 +25,12 @@ fn main() -> ExitCode {
         |without, with| {
             format!(
                 "missed {} without, {} with; wrong openings {}",
-                without.missed, with.missed, with.obeyed.wrong
+                without.missed, with.missed, with.openings.not_sent
             )
         },
     );
     print(&runs, seconds);
-    ExitCode::from(u8::from(runs.iter().any(|(_, with)| with.obeyed.wrong > 0)))
+    ExitCode::from(u8::from(runs.iter().any(|(_, with)| with.openings.not_sent > 0)))
 }
 
 #[allow(clippy::print_stdout)] // the table is the result
@@ -47,10 +47,10 @@ fn print(runs: &[(Outcome, Outcome)], seconds: u32) {
         sum(|with| with.sent.frames),
         sum(|with| with.malformed),
         sum(|with| with.unknown),
-        sum(|with| with.obeyed.openings as u64),
-        sum(|with| with.obeyed.wrong as u64),
-        sum(|with| with.obeyed.shut as u64),
+        sum(|with| with.openings.acted as u64),
+        sum(|with| with.openings.not_sent as u64),
+        sum(|with| with.openings.shut as u64),
         sum(|with| with.stale),
-        runs.iter().map(|(without, _)| without.obeyed.shut).sum::<usize>()
+        runs.iter().map(|(without, _)| without.openings.shut).sum::<usize>()
     );
 }

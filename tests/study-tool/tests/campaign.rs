@@ -4,7 +4,7 @@ use rustix::process::{Pid, Signal, test_kill_process};
 use std::fs;
 use std::process::Command;
 use system_tests::exit::{BAD_INPUT, GOOD, INTERRUPTED};
-use system_tests::{Build, Ended, Program, Running, executable, install, wait_until, workspace};
+use system_tests::{Build, CompletedProcess, Program, Running, executable, install, wait_until, workspace};
 use tempfile::TempDir;
 
 /// Two draws with nothing hidden, and a pair.
@@ -14,11 +14,11 @@ const SHAPE: [&str; 10] =
 const STUDY: &str = env!("CARGO_BIN_EXE_study");
 
 /// A folder with a campaign file and a program that is judged.
-struct Place {
+struct StudyFolder {
     folder: TempDir,
 }
 
-impl Place {
+impl StudyFolder {
     fn new(script: &str, draws: u32) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let program = folder.path().join("program");
@@ -43,7 +43,7 @@ impl Place {
         campaign
     }
 
-    fn run(&self, arguments: &[&str]) -> Ended {
+    fn run(&self, arguments: &[&str]) -> CompletedProcess {
         Running::start("campaign", &mut self.campaign("out", arguments)).wait()
     }
 
@@ -54,11 +54,11 @@ impl Place {
 
 #[test]
 fn shards_fill_one_folder_and_the_study_is_scored() {
-    let place = Place::new("mkdir out; echo '{\"verdict\": \"nothing-missing\"}' >out/report.json", 3);
+    let place = StudyFolder::new("mkdir out; echo '{\"verdict\": \"nothing-missing\"}' >out/report.json", 3);
     for shard in ["1/2", "0/2"] {
         let _ = place.run(&["--shard", shard]).expect_code(GOOD);
     }
-    let _ = place.run(&[]).expect_code(GOOD).expect_said(&["0 to do"]);
+    let _ = place.run(&[]).expect_code(GOOD).expect_stderr(&["0 to do"]);
     let table = place.text("out/runs.csv");
     let rows: Vec<&str> = table.lines().map(|line| line.splitn(8, ',').last().expect("columns")).collect();
     assert_eq!(rows[..3], ["kind,hidden,called,right", "null,nothing,nothing,1", "null,nothing,nothing,1"]);
@@ -72,12 +72,12 @@ fn shards_fill_one_folder_and_the_study_is_scored() {
 
 #[test]
 fn a_study_that_is_stopped_ends_its_programs_and_goes_on() {
-    let place = Place::new("echo $$ >\"$0.number\"; exec sleep 1000", 3);
+    let place = StudyFolder::new("echo $$ >\"$0.number\"; exec sleep 1000", 3);
     let campaign = Running::start("campaign", &mut place.campaign("out", &["--jobs", "1"]));
     let said = place.folder.path().join("program.number");
     wait_until("the program's number", || fs::read_to_string(&said).is_ok_and(|text| text.ends_with('\n')));
     campaign.signal(Signal::INT);
-    let _ = campaign.wait().expect_code(INTERRUPTED).expect_said(&["the same command goes on"]);
+    let _ = campaign.wait().expect_code(INTERRUPTED).expect_stderr(&["the same command goes on"]);
     let number = place.text("program.number").trim().parse().expect("a number");
     let number = Pid::from_raw(number).expect("a process");
     assert!(test_kill_process(number).is_err(), "the program that was judged is still there");
@@ -86,14 +86,14 @@ fn a_study_that_is_stopped_ends_its_programs_and_goes_on() {
 
 #[test]
 fn what_is_no_result_ends_the_study_and_leaves_the_draw_missing() {
-    let place = Place::new("mkdir out; echo '{\"verdict\": \"nothing-missing\"}' >out/report.json", 4);
-    let _ = place.run(&["--jobs", "1"]).expect_code(BAD_INPUT).expect_said(&["needs draws = 3", "kept"]);
+    let place = StudyFolder::new("mkdir out; echo '{\"verdict\": \"nothing-missing\"}' >out/report.json", 4);
+    let _ = place.run(&["--jobs", "1"]).expect_code(BAD_INPUT).expect_stderr(&["needs draws = 3", "kept"]);
     assert!(place.folder.path().join("out/parts/000002.csv").exists());
     assert!(!place.folder.path().join("out/parts/000003.csv").exists());
     // Another program under the same label is reported, whatever the campaign thinks.
     fs::write(place.folder.path().join("program"), "#!/bin/sh\nexit 1\n").expect("another program");
     let again = Running::start("campaign", &mut place.campaign("again", &[])).wait();
-    let _ = again.expect_code(BAD_INPUT).expect_said(&["another --label"]);
+    let _ = again.expect_code(BAD_INPUT).expect_stderr(&["another --label"]);
 }
 
 #[test]

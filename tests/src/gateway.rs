@@ -11,13 +11,13 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// A gateway on the bus of a scene, at a free port of loopback.
-pub struct Door {
+pub struct GatewayProcess {
     running: Running,
     report: PathBuf,
     pub address: SocketAddr,
 }
 
-impl Door {
+impl GatewayProcess {
     /// Opens it; `options` are separated by spaces.
     pub fn open(scene: &Scene, options: &str) -> Self {
         let report = scene.path("gateway.json");
@@ -25,10 +25,10 @@ impl Door {
         command.args(["gateway", "--listen", "127.0.0.1:0", "--bus", &scene.url(), "--report"]).arg(&report);
         let mut running = Running::start("bench gateway", command.args(options.split_whitespace()));
         running.wait_for("Ctrl-C ends it");
-        let said = running.stderr();
-        let address = said.split(" at ").nth(1).and_then(|rest| rest.split(' ').next());
+        let output = running.stderr();
+        let address = output.split(" at ").nth(1).and_then(|rest| rest.split(' ').next());
         let address = address.and_then(|address| address.parse().ok());
-        Self { running, report, address: address.unwrap_or_else(|| panic!("no address in: {said}")) }
+        Self { running, report, address: address.unwrap_or_else(|| panic!("no address in: {output}")) }
     }
 
     /// Waits until it has said this so many times.
@@ -57,41 +57,41 @@ impl Door {
     }
 }
 
-pub struct DoorClient {
+pub struct GatewayClient {
     pub stream: TcpStream,
     text: String,
 }
 
-impl DoorClient {
-    pub fn connect(door: &Door) -> Self {
-        let stream = TcpStream::connect(door.address).expect("the gateway listens");
+impl GatewayClient {
+    pub fn connect(gateway: &GatewayProcess) -> Self {
+        let stream = TcpStream::connect(gateway.address).expect("the gateway listens");
         stream.set_read_timeout(Some(PATIENCE)).expect("a time-out");
         Self { stream, text: String::new() }
     }
 
     /// Connects, as soon as there is room, and goes to raw mode.
-    pub fn on_the_bus(door: &Door) -> Self {
-        let mut client = Self::connect(door);
+    pub fn connect_raw(gateway: &GatewayProcess) -> Self {
+        let mut client = Self::connect(gateway);
         wait_until("a place at the gateway", || {
-            let let_in = client.hear().as_deref() == Some("< hi >");
+            let let_in = client.receive().as_deref() == Some("< hi >");
             if !let_in {
-                client = Self::connect(door);
+                client = Self::connect(gateway);
             }
             let_in
         });
-        client.say("< open bus >");
+        client.send("< open bus >");
         client.expect("< ok >");
-        client.say("< rawmode >");
+        client.send("< rawmode >");
         client.expect("< ok >");
         client
     }
 
-    pub fn say(&mut self, text: &str) {
+    pub fn send(&mut self, text: &str) {
         self.stream.write_all(text.as_bytes()).expect("the gateway takes it");
     }
 
     /// The next `< … >`; `None` at the end of the connection.
-    pub fn hear(&mut self) -> Option<String> {
+    pub fn receive(&mut self) -> Option<String> {
         loop {
             if let Some(end) = self.text.find('>') {
                 let rest = self.text.split_off(end + 1);
@@ -110,19 +110,19 @@ impl DoorClient {
     /// Reads the next `< … >` and holds it against what must come.
     #[track_caller]
     pub fn expect(&mut self, text: &str) {
-        assert_eq!(self.hear().as_deref(), Some(text));
+        assert_eq!(self.receive().as_deref(), Some(text));
     }
 
     /// The next frame: identifier and data, without its time.
     pub fn frame(&mut self) -> (String, String) {
-        let text = self.hear().expect("a frame");
+        let text = self.receive().expect("a frame");
         let words: Vec<_> = text.split(' ').collect();
         assert!(words[..2] == ["<", "frame"] && words[words.len() - 1] == ">", "{text}");
         (words[2].into(), words[4].into())
     }
 
     /// Whether the gateway ends the connection, whatever it says before.
-    pub fn is_parted_with(&mut self) -> bool {
+    pub fn is_disconnected(&mut self) -> bool {
         self.stream.set_read_timeout(Some(Duration::from_secs(20))).expect("a time-out");
         let mut bytes = [0; 4096];
         loop {
