@@ -10,7 +10,7 @@
 //! Source: Moore, Kearfott, Cloud, Introduction to Interval Analysis, SIAM 2009, chapter 2.
 
 use crate::curve::Table;
-use crate::grammar::{Binary, Kind, Nodes, Place, Result, Wrong};
+use crate::grammar::{Binary, ExpressionError, Kind, NodeId, Nodes, Result};
 
 /// Largest bound that counts as finite.
 pub const MOST: f64 = 1e100;
@@ -22,10 +22,10 @@ pub type Range = [f64; 2];
 /// checked.
 ///
 /// # Errors
-/// [`Wrong`] at the node that is not proven finite.
-pub fn bounds(nodes: &Nodes, place: Place, of: &dyn Fn(&str) -> Range, tables: &[Table]) -> Result<Range> {
+/// [`ExpressionError`] at the node that is not proven finite.
+pub fn bounds(nodes: &Nodes, place: NodeId, of: &dyn Fn(&str) -> Range, tables: &[Table]) -> Result<Range> {
     let node = nodes.get(place);
-    let bounds = |place: Place| bounds(nodes, place, of, tables);
+    let bounds = |place: NodeId| bounds(nodes, place, of, tables);
     let range = match &node.kind {
         Kind::Number(value, _) => [*value; 2],
         Kind::Name(name) => of(name),
@@ -36,17 +36,17 @@ pub fn bounds(nodes: &Nodes, place: Place, of: &dyn Fn(&str) -> Range, tables: &
         Kind::Binary(Binary::Power, base, exponent) => {
             let inner = bounds(*base)?;
             let powers = bounds(*exponent)?;
-            power(inner, powers).map_err(|why| Wrong::new(node.at, why))?
+            power(inner, powers).map_err(|why| ExpressionError::new(node.at, why))?
         }
         Kind::Binary(operator, left, right) => {
             let [a, b] = [bounds(*left)?, bounds(*right)?];
-            binary(*operator, a, b).map_err(|why| Wrong::new(node.at, why))?
+            binary(*operator, a, b).map_err(|why| ExpressionError::new(node.at, why))?
         }
         Kind::Call(name, arguments) => {
             let ranges = arguments.iter().map(|argument| bounds(*argument)).collect::<Result<Vec<_>, _>>()?;
             match tables.iter().find(|table| table.name == *name) {
                 Some(table) => table.curve.bounds(ranges[0]),
-                None => call(name, &ranges).map_err(|why| Wrong::new(node.at, why))?,
+                None => call(name, &ranges).map_err(|why| ExpressionError::new(node.at, why))?,
             }
         }
     };
@@ -57,7 +57,7 @@ pub fn bounds(nodes: &Nodes, place: Place, of: &dyn Fn(&str) -> Range, tables: &
     let [least, most] = range;
     let why =
         format!("this may be {least:e} to {most:e}, which counts as not finite: bound it by min and max");
-    Err(Wrong::new(node.at, why))
+    Err(ExpressionError::new(node.at, why))
 }
 
 fn binary(operator: Binary, [a, b]: Range, [c, d]: Range) -> Result<Range, String> {
@@ -140,7 +140,7 @@ fn hull(values: &[f64]) -> Range {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::formula::{Formula, Known, Variable};
+    use crate::formula::{Formula, SymbolTable, Variable};
     use crate::units::Dimension;
     use proptest::prelude::*;
 
@@ -197,7 +197,7 @@ mod tests {
             ][which];
             let one = |name, range| Variable { name, dimension: Dimension::NONE, range };
             let over = [one("x", [-2.0, 2.0]), one("y", [0.1, 3.0])];
-            let known = Known { variables: &over, parameters: &[], tables: &[] };
+            let known = SymbolTable { variables: &over, parameters: &[], tables: &[] };
             let formula = Formula::compile((text, 0), known, (Dimension::NONE, "it")).unwrap();
             let ([least, most], value) = (formula.bounds, formula.value(&[x, y]));
             prop_assert!(least - 1e-9 <= value && value <= most + 1e-9, "{text}: {value} in {least} to {most}");

@@ -1,6 +1,6 @@
 //! From a tree to registers: what every expression has in common. Names, and functions of its own, are the caller's.
 
-use crate::grammar::{Binary, Kind, Node, Place, Result, Wrong};
+use crate::grammar::{Binary, ExpressionError, Kind, Node, NodeId, Result};
 use crate::tape::{Builder, Code, Register};
 
 /// Names that mean something in every expression.
@@ -35,7 +35,7 @@ pub trait Compile {
     /// Where an expression stands, if names mean different things at different places.
     type Scope: Copy;
 
-    fn at(&self, place: Place) -> Node;
+    fn at(&self, place: NodeId) -> Node;
 
     /// Where operations are collected.
     fn builder(&mut self) -> &mut Builder;
@@ -43,17 +43,17 @@ pub trait Compile {
     /// The register of a name.
     ///
     /// # Errors
-    /// [`Wrong`] for a name that means nothing here.
+    /// [`ExpressionError`] for a name that means nothing here.
     fn named(&mut self, name: &str, at: usize, scope: Self::Scope) -> Result<Register>;
 
     /// The register of a function that is not one of [`function`]; `None` where there is none of this name.
     ///
     /// # Errors
-    /// [`Wrong`] for arguments that it does not take.
+    /// [`ExpressionError`] for arguments that it does not take.
     fn called(
         &mut self,
         name: &str,
-        arguments: &[Place],
+        arguments: &[NodeId],
         at: usize,
         scope: Self::Scope,
     ) -> Result<Option<Register>>;
@@ -61,8 +61,8 @@ pub trait Compile {
     /// The register of a node; dimensions and numbers of arguments were checked.
     ///
     /// # Errors
-    /// [`Wrong`] with the byte of the file.
-    fn node(&mut self, place: Place, scope: Self::Scope) -> Result<Register> {
+    /// [`ExpressionError`] with the byte of the file.
+    fn node(&mut self, place: NodeId, scope: Self::Scope) -> Result<Register> {
         let node = self.at(place);
         Ok(match node.kind {
             Kind::Number(value, _) => self.builder().constant(value),
@@ -88,8 +88,8 @@ pub trait Compile {
     /// The register of a call.
     ///
     /// # Errors
-    /// [`Wrong`] with the byte of the file.
-    fn call(&mut self, name: &str, arguments: &[Place], at: usize, scope: Self::Scope) -> Result<Register> {
+    /// [`ExpressionError`] with the byte of the file.
+    fn call(&mut self, name: &str, arguments: &[NodeId], at: usize, scope: Self::Scope) -> Result<Register> {
         if let Some(register) = self.called(name, arguments, at, scope)? {
             return Ok(register);
         }
@@ -99,7 +99,8 @@ pub trait Compile {
             let zero = self.builder().constant(0.0);
             return Ok(self.builder().push(Code::Equal, &[operands[0], zero]));
         }
-        let (code, _) = function(name).ok_or_else(|| Wrong::new(at, format!("'{name}' is no function")))?;
+        let (code, _) =
+            function(name).ok_or_else(|| ExpressionError::new(at, format!("'{name}' is no function")))?;
         if matches!(code, Code::Min | Code::Max) {
             let [first, rest @ ..] = operands.as_slice() else {
                 unreachable!("the number of arguments was checked")

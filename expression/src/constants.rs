@@ -4,15 +4,15 @@
 //! it. What depends on a name can be 0 at some samples alone, or be guarded by a condition: that is seen when it is computed.
 
 use crate::compile::{code_of, function};
-use crate::grammar::{Binary, Kind, Nodes, Result, Wrong};
+use crate::grammar::{Binary, ExpressionError, Kind, Nodes, Result};
 use crate::inputs::Inputs;
-use crate::operation::{Around, Code};
+use crate::operation::{Code, EvaluationContext};
 use crate::past::NONE;
 
 /// Of each node its value if it is a constant.
 ///
 /// # Errors
-/// [`Wrong`] at the operator or function whose value is no finite number.
+/// [`ExpressionError`] at the operator or function whose value is no finite number.
 pub fn constants(nodes: &Nodes) -> Result<Vec<Option<f64>>> {
     let mut values: Vec<Option<f64>> = Vec::new();
     // What a node is made of stands before it.
@@ -23,7 +23,7 @@ pub fn constants(nodes: &Nodes) -> Result<Vec<Option<f64>>> {
             Kind::Name(name) => (name == "pi").then_some(std::f64::consts::PI),
             Kind::Negation(inner) => of(inner).map(|value| -value),
             Kind::Binary(Binary::Divide, _, below) if of(below) == Some(0.0) => {
-                return Err(Wrong::new(node.at, "this divides by 0"));
+                return Err(ExpressionError::new(node.at, "this divides by 0"));
             }
             Kind::Binary(operator, left, right) => {
                 of(left).zip(of(right)).map(|(a, b)| computed(code_of(*operator), [a, b, 0.0]))
@@ -35,7 +35,7 @@ pub fn constants(nodes: &Nodes) -> Result<Vec<Option<f64>>> {
         };
         if let Some(value) = value.filter(|value| !value.is_finite()) {
             let found = if value.is_nan() { "not a number".into() } else { value.to_string() };
-            return Err(Wrong::new(node.at, format!("this is no finite number: {found}")));
+            return Err(ExpressionError::new(node.at, format!("this is no finite number: {found}")));
         }
         values.push(value);
     }
@@ -56,7 +56,10 @@ fn call(name: &str, arguments: &[f64]) -> Option<f64> {
 }
 
 fn computed(code: Code, operands: [f64; 3]) -> f64 {
-    code.value(operands, &Around { time_s: 0.0, inputs: &Inputs::none(), past: &NONE, curves: &[] })
+    code.value(
+        operands,
+        &EvaluationContext { time_s: 0.0, inputs: &Inputs::none(), history: &NONE, curves: &[] },
+    )
 }
 
 #[cfg(test)]

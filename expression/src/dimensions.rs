@@ -1,7 +1,7 @@
 //! The dimension of an expression, and the numbers of arguments in it.
 
 use crate::compile::function;
-use crate::grammar::{Binary, Kind, Node, Place, Result, Wrong};
+use crate::grammar::{Binary, ExpressionError, Kind, Node, NodeId, Result};
 use crate::units::{Dimension, Unit};
 
 /// `None` is the dimension of 0, which is any.
@@ -12,12 +12,12 @@ pub trait Dimensions {
     /// Where an expression stands, if names mean different things at different places.
     type Scope: Copy;
 
-    fn at(&self, place: Place) -> Node;
+    fn at(&self, place: NodeId) -> Node;
 
     /// The dimension of a name.
     ///
     /// # Errors
-    /// [`Wrong`] for a name that means nothing here.
+    /// [`ExpressionError`] for a name that means nothing here.
     fn named(&mut self, name: &str, at: usize, scope: Self::Scope) -> Result<Measure>;
 
     /// Number of arguments of a function that is not one of [`function`], and what follows the known ones in a message.
@@ -34,30 +34,31 @@ pub trait Dimensions {
     /// The dimension of a call of such a function.
     ///
     /// # Errors
-    /// [`Wrong`] for arguments that it does not take.
+    /// [`ExpressionError`] for arguments that it does not take.
     fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure>;
 
     /// Checks an expression against the dimension that it must have; it begins at byte `at`.
     ///
     /// # Errors
-    /// [`Wrong`] with the byte of the file.
+    /// [`ExpressionError`] with the byte of the file.
     fn expression(
         &mut self,
-        place: Place,
+        place: NodeId,
         scope: Self::Scope,
         wanted: Dimension,
         (at, what): (usize, &str),
     ) -> Result<()> {
-        let found = self.node(place, scope).map_err(|wrong| match wrong.is_of_units {
-            true if wanted != Dimension::NONE => {
-                Wrong { why: format!("{}; {what} is in {}", wrong.why, self.in_units(wanted)), ..wrong }
-            }
+        let found = self.node(place, scope).map_err(|wrong| match wrong.is_unit_mismatch {
+            true if wanted != Dimension::NONE => ExpressionError {
+                why: format!("{}; {what} is in {}", wrong.why, self.in_units(wanted)),
+                ..wrong
+            },
             _ => wrong,
         })?;
         match found {
             Some(found) if found != wanted => {
                 let [wanted, found] = [wanted, found].map(|one| self.in_units(one));
-                Err(Wrong::new(at, format!("{what} is in {wanted}, and this is in {found}")))
+                Err(ExpressionError::new(at, format!("{what} is in {wanted}, and this is in {found}")))
             }
             _ => Ok(()),
         }
@@ -66,8 +67,8 @@ pub trait Dimensions {
     /// The dimension of a node.
     ///
     /// # Errors
-    /// [`Wrong`] with the byte of the file.
-    fn node(&mut self, place: Place, scope: Self::Scope) -> Result<Measure> {
+    /// [`ExpressionError`] with the byte of the file.
+    fn node(&mut self, place: NodeId, scope: Self::Scope) -> Result<Measure> {
         let node = self.at(place);
         match &node.kind {
             Kind::Number(value, None) => Ok((*value != 0.0).then_some(Dimension::NONE)),
@@ -100,10 +101,10 @@ pub trait Dimensions {
     /// The dimension of a power.
     ///
     /// # Errors
-    /// [`Wrong`] with the byte of the file.
-    fn power(&self, base: Measure, exponent: Measure, place: Place, at: usize) -> Result<Measure> {
+    /// [`ExpressionError`] with the byte of the file.
+    fn power(&self, base: Measure, exponent: Measure, place: NodeId, at: usize) -> Result<Measure> {
         if exponent.is_some_and(|exponent| exponent != Dimension::NONE) {
-            return Err(Wrong::new(at, "an exponent has no unit"));
+            return Err(ExpressionError::new(at, "an exponent has no unit"));
         }
         let Some(base) = base.filter(|base| *base != Dimension::NONE) else {
             return Ok(Some(Dimension::NONE));
@@ -123,14 +124,14 @@ pub trait Dimensions {
                 self.in_units(base)
             )
         };
-        power.map(Some).ok_or_else(|| Wrong::new(at, why()))
+        power.map(Some).ok_or_else(|| ExpressionError::new(at, why()))
     }
 
     /// The dimension of a call.
     ///
     /// # Errors
-    /// [`Wrong`] with the byte of the file.
-    fn call(&mut self, name: &str, arguments: &[Place], at: usize, scope: Self::Scope) -> Result<Measure> {
+    /// [`ExpressionError`] with the byte of the file.
+    fn call(&mut self, name: &str, arguments: &[NodeId], at: usize, scope: Self::Scope) -> Result<Measure> {
         let own = self.arguments(name);
         let least = match (own, function(name)) {
             (Some(count), _) => count,
@@ -141,13 +142,13 @@ pub trait Dimensions {
                 let known = format!(
                     "abs, sign, min, max, sqrt, exp, log, tanh, sin, cos, atan, floor, if, not{more}"
                 );
-                return Err(Wrong::new(at, format!("'{name}' is no function; known are {known}")));
+                return Err(ExpressionError::new(at, format!("'{name}' is no function; known are {known}")));
             }
         };
         let takes_more = own.is_none() && matches!(name, "min" | "max");
         if arguments.len() < least || !takes_more && arguments.len() > least {
             let more = if takes_more { " or more" } else { "" };
-            return Err(Wrong::new(
+            return Err(ExpressionError::new(
                 at,
                 format!("{name} has {} arguments; it takes {least}{more}", arguments.len()),
             ));
@@ -169,7 +170,7 @@ pub trait Dimensions {
                         self.in_units(squared)
                     )
                 };
-                squared.to_the(0.5).map(Some).ok_or_else(|| Wrong::new(at, why()))
+                squared.to_the(0.5).map(Some).ok_or_else(|| ExpressionError::new(at, why()))
             }
             "min" | "max" => {
                 let mut all = measures.iter().zip(arguments).map(|(measure, place)| (*measure, *place));
@@ -190,12 +191,15 @@ pub trait Dimensions {
     /// Checks the dimension of a function's argument.
     ///
     /// # Errors
-    /// [`Wrong`] where it is another.
+    /// [`ExpressionError`] where it is another.
     fn takes(&self, name: &str, measure: Measure, wanted: Dimension, at: usize) -> Result<()> {
         match measure {
             Some(found) if found != wanted => {
                 let [wanted, found] = [wanted, found].map(|one| self.in_units(one));
-                Err(Wrong::of_units(at, format!("{name} takes a value in {wanted}, and this is in {found}")))
+                Err(ExpressionError::unit_mismatch(
+                    at,
+                    format!("{name} takes a value in {wanted}, and this is in {found}"),
+                ))
             }
             _ => Ok(()),
         }
@@ -204,12 +208,15 @@ pub trait Dimensions {
     /// Checks what is taken as true or false.
     ///
     /// # Errors
-    /// [`Wrong`] where it has a unit.
+    /// [`ExpressionError`] where it has a unit.
     fn truth(&self, name: &str, measure: Measure, at: usize) -> Result<()> {
         match measure {
             Some(found) if found != Dimension::NONE => {
                 let found = self.in_units(found);
-                Err(Wrong::new(at, format!("{name} takes a condition, and this is in {found}: compare it")))
+                Err(ExpressionError::new(
+                    at,
+                    format!("{name} takes a condition, and this is in {found}: compare it"),
+                ))
             }
             _ => Ok(()),
         }
@@ -218,21 +225,21 @@ pub trait Dimensions {
     /// Checks that two operands have one dimension, which one of them may leave open.
     ///
     /// # Errors
-    /// [`Wrong`] where they have not.
-    fn same(&self, operands: [(Measure, Place); 2], at: usize, what: &str) -> Result<Measure> {
+    /// [`ExpressionError`] where they have not.
+    fn same(&self, operands: [(Measure, NodeId); 2], at: usize, what: &str) -> Result<Measure> {
         let [(a, left), (b, right)] = operands;
         match (a, b) {
             (Some(a), Some(b)) if a != b => {
                 let [a, b] = [a, b].map(|one| self.in_units(one));
                 let [left, right] = [left, right].map(|place| self.written(place));
-                Err(Wrong::of_units(at, format!("{what} of {left} in {a} and {right} in {b}")))
+                Err(ExpressionError::unit_mismatch(at, format!("{what} of {left} in {a} and {right} in {b}")))
             }
             _ => Ok(a.or(b)),
         }
     }
 
     /// A node as a message names it: what is short as it is written, else a value.
-    fn written(&self, place: Place) -> String {
+    fn written(&self, place: NodeId) -> String {
         match &self.at(place).kind {
             Kind::Number(value, None) => format!("the number {value}"),
             Kind::Name(name) if is_of_file(name) => format!("'{name}'"),

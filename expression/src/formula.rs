@@ -10,14 +10,14 @@ use crate::bounds::{Range, bounds};
 use crate::compile::Compile;
 use crate::curve::Table;
 use crate::dimensions::{Dimensions, Measure};
-use crate::grammar::{Kind, Node, Nodes, Place, Result, Wrong};
-use crate::tape::{Builder, Code, Leaves, Register, Tape};
+use crate::grammar::{ExpressionError, Kind, Node, NodeId, Nodes, Result};
+use crate::tape::{Builder, Code, LeafLayout, Register, Tape};
 use crate::units::Dimension;
 
 /// Registers of a formula at most: names, numbers and operations.
 pub const MOST_REGISTERS: usize = 96;
 
-/// What a formula is over.
+/// A variable or a parameter of a formula.
 #[derive(Clone, Copy, Debug)]
 pub struct Variable<'a> {
     /// Its name in the expression; empty where a parameter has taken it.
@@ -28,12 +28,12 @@ pub struct Variable<'a> {
     pub range: Range,
 }
 
-/// What the names of an expression stand for.
+/// The names that an expression may use.
 #[derive(Clone, Copy, Debug)]
-pub struct Known<'a> {
-    /// What it is over.
+pub struct SymbolTable<'a> {
+    /// Values that change over a run.
     pub variables: &'a [Variable<'a>],
-    /// What stays the same over a run.
+    /// Values that are constant over a run.
     pub parameters: &'a [Variable<'a>],
     /// Curves that it may read.
     pub tables: &'a [Table],
@@ -58,10 +58,11 @@ impl Formula {
     /// Compiles an expression that begins at byte `at` of its file and must have a dimension.
     ///
     /// # Errors
-    /// [`Wrong`] with the byte of the file: no expression, an unknown name, another dimension, too long, or not proven finite.
+    /// [`ExpressionError`] with the byte of the file: no expression, an unknown name, another dimension, too long, or not proven
+    /// finite.
     pub fn compile(
         (text, at): (&str, usize),
-        known: Known<'_>,
+        symbols: SymbolTable<'_>,
         (wanted, what): (Dimension, &str),
     ) -> Result<Self> {
         let mut nodes = Nodes::default();
@@ -69,27 +70,28 @@ impl Formula {
         let is_called = |table: &&Table| {
             nodes.tree(root).any(|node| matches!(&node.kind, Kind::Call(name, _) if *name == table.name))
         };
-        let tables: Vec<Table> = known.tables.iter().filter(is_called).cloned().collect();
-        let (has_tables, known) = (!known.tables.is_empty(), Known { tables: &tables, ..known });
-        let Known { variables, parameters, .. } = known;
-        let leaves = Leaves { inputs: variables.len(), parameters: parameters.len(), ..Leaves::default() };
-        let mut names = Names { nodes, known, has_tables, builder: Builder::new(leaves) };
-        names.expression(root, (), wanted, (at, what))?;
-        let of = |name: &str| match names.place(name) {
-            Some(place) => names.variable(place).range,
+        let tables: Vec<Table> = symbols.tables.iter().filter(is_called).cloned().collect();
+        let (has_tables, symbols) = (!symbols.tables.is_empty(), SymbolTable { tables: &tables, ..symbols });
+        let SymbolTable { variables, parameters, .. } = symbols;
+        let leaves =
+            LeafLayout { inputs: variables.len(), parameters: parameters.len(), ..LeafLayout::default() };
+        let mut compiler = FormulaCompiler { nodes, symbols, has_tables, builder: Builder::new(leaves) };
+        compiler.expression(root, (), wanted, (at, what))?;
+        let of = |name: &str| match compiler.place(name) {
+            Some(place) => compiler.variable(place).range,
             None => [std::f64::consts::PI; 2],
         };
-        let bounds = bounds(&names.nodes, root, &of, &tables)?;
+        let bounds = bounds(&compiler.nodes, root, &of, &tables)?;
         let is_read = |variable: &Variable<'_>| {
             let is_it = |node: &Node| matches!(&node.kind, Kind::Name(name) if name == variable.name);
-            names.nodes.tree(root).any(is_it).then_some(variable.range)
+            compiler.nodes.tree(root).any(is_it).then_some(variable.range)
         };
         let ranges = variables.iter().map(is_read).collect();
-        let result = Compile::node(&mut names, root, ())?;
-        let tape = names.builder.tape(&[result], tables.iter().map(|table| table.curve.clone()).collect());
+        let result = Compile::node(&mut compiler, root, ())?;
+        let tape = compiler.builder.tape(&[result], tables.iter().map(|table| table.curve.clone()).collect());
         if tape.registers() > MOST_REGISTERS {
             let why = format!("more than {MOST_REGISTERS} names, numbers and operations in one expression");
-            return Err(Wrong::new(at, why));
+            return Err(ExpressionError::new(at, why));
         }
         let mut registers = [0.0; MOST_REGISTERS];
         tape.begin(&mut registers);
@@ -138,40 +140,40 @@ impl Formula {
     }
 }
 
-struct Names<'a> {
+struct FormulaCompiler<'a> {
     nodes: Nodes,
-    /// With the tables that it reads alone.
-    known: Known<'a>,
+    /// Of the tables those that it reads.
+    symbols: SymbolTable<'a>,
     has_tables: bool,
     builder: Builder,
 }
 
-impl Names<'_> {
+impl FormulaCompiler<'_> {
     /// The place of a name among variables and parameters.
     fn place(&self, name: &str) -> Option<usize> {
-        self.known.variables.iter().chain(self.known.parameters).position(|one| one.name == name)
+        self.symbols.variables.iter().chain(self.symbols.parameters).position(|one| one.name == name)
     }
 
     fn variable(&self, place: usize) -> &Variable<'_> {
-        let Known { variables, parameters, .. } = self.known;
+        let SymbolTable { variables, parameters, .. } = self.symbols;
         variables.get(place).unwrap_or_else(|| &parameters[place - variables.len()])
     }
 
     fn table(&self, name: &str) -> Option<usize> {
-        self.known.tables.iter().position(|table| table.name == name)
+        self.symbols.tables.iter().position(|table| table.name == name)
     }
 
-    fn unknown(&self, name: &str, at: usize) -> Wrong {
-        let names = self.known.variables.iter().chain(self.known.parameters).map(|one| one.name);
-        let known: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
-        Wrong::new(at, format!("'{name}' is unknown here; known are pi, {}", known.join(", ")))
+    fn unknown(&self, name: &str, at: usize) -> ExpressionError {
+        let names = self.symbols.variables.iter().chain(self.symbols.parameters).map(|one| one.name);
+        let symbols: Vec<&str> = names.filter(|name| !name.is_empty()).collect();
+        ExpressionError::new(at, format!("'{name}' is unknown here; known are pi, {}", symbols.join(", ")))
     }
 }
 
-impl Dimensions for Names<'_> {
+impl Dimensions for FormulaCompiler<'_> {
     type Scope = ();
 
-    fn at(&self, place: Place) -> Node {
+    fn at(&self, place: NodeId) -> Node {
         self.nodes.get(place).clone()
     }
 
@@ -193,21 +195,21 @@ impl Dimensions for Names<'_> {
 
     fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure> {
         let table = self.table(name).ok_or_else(|| self.unknown(name, at))?;
-        let Table { from, to, .. } = &self.known.tables[table];
+        let Table { from, to, .. } = &self.symbols.tables[table];
         match measures[0] {
             Some(given) if given != from.dimension => {
                 let [wanted, given] = [from.dimension, given].map(|one| self.in_units(one));
-                Err(Wrong::new(at, format!("{name} is over {wanted}, and this is in {given}")))
+                Err(ExpressionError::new(at, format!("{name} is over {wanted}, and this is in {given}")))
             }
             _ => Ok(Some(to.dimension)),
         }
     }
 }
 
-impl Compile for Names<'_> {
+impl Compile for FormulaCompiler<'_> {
     type Scope = ();
 
-    fn at(&self, place: Place) -> Node {
+    fn at(&self, place: NodeId) -> Node {
         self.nodes.get(place).clone()
     }
 
@@ -218,13 +220,13 @@ impl Compile for Names<'_> {
     fn named(&mut self, name: &str, _at: usize, (): ()) -> Result<Register> {
         let leaves = self.builder.leaves;
         Ok(match self.place(name) {
-            Some(place) if place < self.known.variables.len() => leaves.input(place),
-            Some(place) => leaves.parameter(place - self.known.variables.len()),
+            Some(place) if place < self.symbols.variables.len() => leaves.input(place),
+            Some(place) => leaves.parameter(place - self.symbols.variables.len()),
             None => self.builder.constant(std::f64::consts::PI),
         })
     }
 
-    fn called(&mut self, name: &str, arguments: &[Place], _at: usize, (): ()) -> Result<Option<Register>> {
+    fn called(&mut self, name: &str, arguments: &[NodeId], _at: usize, (): ()) -> Result<Option<Register>> {
         let Some(table) = self.table(name) else { return Ok(None) };
         let operand = Compile::node(self, arguments[0], ())?;
         Ok(Some(self.builder.push(Code::Table(table as u16), &[operand])))
@@ -252,8 +254,8 @@ mod tests {
             (vec![0.0, 3.0, -1.0], Unit::parse("kN").unwrap()),
         );
         let tables = [lift.unwrap()];
-        let known = Known { variables: &variables, parameters: &parameters, tables: &tables };
-        Formula::compile((text, 100), known, (dimension("N"), "force"))
+        let symbols = SymbolTable { variables: &variables, parameters: &parameters, tables: &tables };
+        Formula::compile((text, 100), symbols, (dimension("N"), "force"))
     }
 
     #[test]

@@ -23,8 +23,8 @@ pub const MOST_NODES: usize = 10_000;
 /// Deepest nesting of an expression.
 pub const DEEPEST: usize = 64;
 
-/// A node in the list of all nodes of a file.
-pub type Place = u32;
+/// Index of a node in the list of all nodes of a file.
+pub type NodeId = u32;
 
 /// What a node computes.
 #[derive(Clone, Debug, PartialEq)]
@@ -32,13 +32,13 @@ pub enum Kind {
     /// A number in SI with its unit, if it has one.
     Number(f64, Option<Unit>),
     Name(String),
-    Negation(Place),
-    Binary(Binary, Place, Place),
-    Call(String, Vec<Place>),
+    Negation(NodeId),
+    Binary(Binary, NodeId, NodeId),
+    Call(String, Vec<NodeId>),
 }
 
 impl Kind {
-    fn operands(&self) -> Vec<Place> {
+    fn operands(&self) -> Vec<NodeId> {
         match self {
             Kind::Number(..) | Kind::Name(_) => Vec::new(),
             Kind::Negation(inner) => vec![*inner],
@@ -76,30 +76,30 @@ pub struct Node {
 #[derive(Clone, Debug, Default)]
 pub struct Nodes(Vec<Node>);
 
-/// What is no expression: at which byte of the file, and why.
+/// An error in an expression: at which byte of the file, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Wrong {
+pub struct ExpressionError {
     pub at: usize,
     pub why: String,
-    /// Two units that do not fit: which is asked for depends on the whole expression.
-    pub is_of_units: bool,
+    /// Two units do not match; which one is expected depends on the whole expression.
+    pub is_unit_mismatch: bool,
 }
 
-/// What is made of an expression, or why it is none.
-pub type Result<T, E = Wrong> = core::result::Result<T, E>;
+/// Result of reading or compiling an expression.
+pub type Result<T, E = ExpressionError> = core::result::Result<T, E>;
 
-impl Wrong {
+impl ExpressionError {
     pub fn new(at: usize, why: impl Into<String>) -> Self {
-        Self { at, why: why.into(), is_of_units: false }
+        Self { at, why: why.into(), is_unit_mismatch: false }
     }
 
-    pub fn of_units(at: usize, why: impl Into<String>) -> Self {
-        Self { is_of_units: true, ..Self::new(at, why) }
+    pub fn unit_mismatch(at: usize, why: impl Into<String>) -> Self {
+        Self { is_unit_mismatch: true, ..Self::new(at, why) }
     }
 }
 
 impl Nodes {
-    pub fn get(&self, place: Place) -> &Node {
+    pub fn get(&self, place: NodeId) -> &Node {
         &self.0[place as usize]
     }
 
@@ -109,7 +109,7 @@ impl Nodes {
     }
 
     /// A node and all that it is made of, from left to right.
-    pub fn tree(&self, root: Place) -> impl Iterator<Item = &Node> {
+    pub fn tree(&self, root: NodeId) -> impl Iterator<Item = &Node> {
         let mut left = vec![root];
         std::iter::from_fn(move || {
             let node = self.get(left.pop()?);
@@ -118,70 +118,70 @@ impl Nodes {
         })
     }
 
-    fn push(&mut self, kind: Kind, at: usize) -> Result<Place> {
+    fn push(&mut self, kind: Kind, at: usize) -> Result<NodeId> {
         let depth = 1 + kind.operands().iter().map(|place| self.get(*place).depth).max().unwrap_or(0);
         if depth > DEEPEST {
-            return Err(Wrong::new(at, too_deep()));
+            return Err(ExpressionError::new(at, too_deep()));
         }
         if self.0.len() >= MOST_NODES {
-            return Err(Wrong::new(
+            return Err(ExpressionError::new(
                 at,
                 format!("more than {MOST_NODES} numbers, names and operators in this file"),
             ));
         }
         self.0.push(Node { kind, at, depth });
-        Ok(self.0.len() as Place - 1)
+        Ok(self.0.len() as NodeId - 1)
     }
 
     /// Reads an expression that begins at byte `at` of its file.
-    pub fn parse(&mut self, text: &str, at: usize) -> Result<Place> {
-        Parser { text, begins: at, at: 0, nested: 0, nodes: self, names: None }.all()
+    pub fn parse(&mut self, text: &str, at: usize) -> Result<NodeId> {
+        Parser { text, offset: at, at: 0, nested: 0, nodes: self, bindings: None }.whole()
     }
 
-    /// Reads an expression of another file, all of it at byte `at` of the one that uses it, with what stands for its names.
+    /// Reads an expression of another file, all of it at byte `at` of the one that uses it, with its names bound.
     ///
     /// # Errors
-    /// [`Wrong`] at byte `at`.
-    pub fn parse_bound(&mut self, text: &str, at: usize, names: &Names<'_>) -> Result<Place> {
-        Parser { text, begins: at, at: 0, nested: 0, nodes: self, names: Some(names) }.all()
+    /// [`ExpressionError`] at byte `at`.
+    pub fn parse_bound(&mut self, text: &str, at: usize, bindings: &Bindings<'_>) -> Result<NodeId> {
+        Parser { text, offset: at, at: 0, nested: 0, nodes: self, bindings: Some(bindings) }.whole()
     }
 
     /// The product of two expressions.
     ///
     /// # Errors
-    /// [`Wrong`] at byte `at` where it is nested too deep.
-    pub fn product(&mut self, left: Place, right: Place, at: usize) -> Result<Place> {
+    /// [`ExpressionError`] at byte `at` where it is nested too deep.
+    pub fn product(&mut self, left: NodeId, right: NodeId, at: usize) -> Result<NodeId> {
         self.push(Kind::Binary(Binary::Multiply, left, right), at)
     }
 
     /// Appends an operand that is called by a name.
     ///
     /// # Errors
-    /// [`Wrong`] at byte `at` where there are too many.
-    pub fn name(&mut self, name: &str, at: usize) -> Result<Place> {
+    /// [`ExpressionError`] at byte `at` where there are too many.
+    pub fn name(&mut self, name: &str, at: usize) -> Result<NodeId> {
         self.push(Kind::Name(name.into()), at)
     }
 }
 
-/// What stands for a name of an expression that another file has.
+/// What a name in the expression of another file is bound to.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Stands {
+pub enum Binding {
     /// An expression that was read before.
-    Expression(Place),
+    Expression(NodeId),
     /// Another name.
     Name(String),
 }
 
-/// What stands for names; those that it has nothing for stay.
-pub type Names<'a> = dyn Fn(&str) -> Option<Stands> + 'a;
+/// Bindings of names; a name without one stays as it is.
+pub type Bindings<'a> = dyn Fn(&str) -> Option<Binding> + 'a;
 
 struct Parser<'a> {
     text: &'a str,
-    begins: usize,
+    offset: usize,
     at: usize,
     nested: usize,
     nodes: &'a mut Nodes,
-    names: Option<&'a Names<'a>>,
+    bindings: Option<&'a Bindings<'a>>,
 }
 
 /// Operators by their level, longest first.
@@ -208,7 +208,7 @@ fn too_deep() -> String {
 }
 
 impl Parser<'_> {
-    fn all(mut self) -> Result<Place> {
+    fn whole(mut self) -> Result<NodeId> {
         let place = self.level(0)?;
         self.skip_blanks();
         if self.at < self.text.len() {
@@ -219,11 +219,11 @@ impl Parser<'_> {
 
     /// Byte of the file that is read.
     fn place(&self) -> usize {
-        self.begins + if self.names.is_some() { 0 } else { self.at }
+        self.offset + if self.bindings.is_some() { 0 } else { self.at }
     }
 
-    fn wrong(&self, why: &str) -> Wrong {
-        Wrong::new(self.place(), why)
+    fn wrong(&self, why: &str) -> ExpressionError {
+        ExpressionError::new(self.place(), why)
     }
 
     fn rest(&self) -> &str {
@@ -239,7 +239,7 @@ impl Parser<'_> {
         let is_there = self.rest().starts_with(wanted);
         // A word ends where no letter follows.
         let goes_on = wanted.starts_with(char::is_alphabetic)
-            && self.rest().get(wanted.len()..).is_some_and(|rest| rest.starts_with(is_of_name));
+            && self.rest().get(wanted.len()..).is_some_and(|rest| rest.starts_with(is_name_character));
         if is_there && !goes_on {
             self.at += wanted.len();
         }
@@ -250,14 +250,14 @@ impl Parser<'_> {
     fn deeper<T>(&mut self, at: usize, inner: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         self.nested += 1;
         if self.nested > DEEPEST {
-            return Err(Wrong::new(at, too_deep()));
+            return Err(ExpressionError::new(at, too_deep()));
         }
         let value = inner(self)?;
         self.nested -= 1;
         Ok(value)
     }
 
-    fn level(&mut self, level: usize) -> Result<Place> {
+    fn level(&mut self, level: usize) -> Result<NodeId> {
         let Some(operators) = LEVELS.get(level) else { return self.negation() };
         let first = self.level(level + 1)?;
         let mut rest = Vec::new();
@@ -270,7 +270,7 @@ impl Parser<'_> {
         self.nodes.chain(first, &rest)
     }
 
-    fn negation(&mut self) -> Result<Place> {
+    fn negation(&mut self) -> Result<NodeId> {
         self.skip_blanks();
         let at = self.place();
         if self.take("-") {
@@ -290,7 +290,7 @@ impl Parser<'_> {
         Ok(base)
     }
 
-    fn atom(&mut self) -> Result<Place> {
+    fn atom(&mut self) -> Result<NodeId> {
         self.skip_blanks();
         let at = self.place();
         if self.take("(") {
@@ -308,15 +308,15 @@ impl Parser<'_> {
         if first.is_ascii_digit() || first == '.' {
             return self.number(at);
         }
-        if !is_of_name(first) {
+        if !is_name_character(first) {
             return Err(self.wrong(&format!("'{first}' where a number, a name or a bracket should stand")));
         }
-        let name: String = rest.chars().take_while(|character| is_of_name(*character)).collect();
+        let name: String = rest.chars().take_while(|character| is_name_character(*character)).collect();
         self.at += name.len();
         if !self.take("(") {
-            return match self.names.and_then(|names| names(&name)) {
-                Some(Stands::Expression(place)) => Ok(place),
-                Some(Stands::Name(other)) => self.nodes.push(Kind::Name(other), at),
+            return match self.bindings.and_then(|bindings| bindings(&name)) {
+                Some(Binding::Expression(place)) => Ok(place),
+                Some(Binding::Name(other)) => self.nodes.push(Kind::Name(other), at),
                 None => self.nodes.push(Kind::Name(name), at),
             };
         }
@@ -335,7 +335,7 @@ impl Parser<'_> {
         self.nodes.push(Kind::Call(name, arguments), at)
     }
 
-    fn number(&mut self, at: usize) -> Result<Place> {
+    fn number(&mut self, at: usize) -> Result<NodeId> {
         let length = number_length(self.rest());
         let text = &self.rest()[..length];
         let Some(value) = text.parse::<f64>().ok().filter(|value| value.is_finite()) else {
@@ -347,13 +347,13 @@ impl Parser<'_> {
         }
         let Some(end) = self.rest().find(']') else { return Err(self.wrong("] is missing after a unit")) };
         let unit = Unit::parse(&self.rest()[..end])
-            .map_err(|error| Wrong::new(self.place() + error.at, error.why))?;
+            .map_err(|error| ExpressionError::new(self.place() + error.at, error.why))?;
         self.at += end + 1;
         self.nodes.push(Kind::Number(value * unit.factor, Some(unit)), at)
     }
 }
 
-pub fn is_of_name(character: char) -> bool {
+pub fn is_name_character(character: char) -> bool {
     character.is_alphanumeric() || character == '_'
 }
 
@@ -367,8 +367,8 @@ pub fn renamed(text: &str, other: &dyn Fn(&str) -> Option<String>) -> String {
             number_length(rest).max(1)
         } else if first == '[' {
             rest.find(']').map_or(rest.len(), |end| end + 1)
-        } else if is_of_name(first) {
-            rest.find(|character| !is_of_name(character)).unwrap_or(rest.len())
+        } else if is_name_character(first) {
+            rest.find(|character| !is_name_character(character)).unwrap_or(rest.len())
         } else {
             first.len_utf8()
         };
@@ -402,7 +402,7 @@ mod tests {
     use super::*;
 
     /// A tree as a text with all its brackets.
-    fn shown(nodes: &Nodes, place: Place) -> String {
+    fn shown(nodes: &Nodes, place: NodeId) -> String {
         match &nodes.get(place).kind {
             Kind::Number(value, _) => value.to_string(),
             Kind::Name(name) => name.clone(),

@@ -5,7 +5,7 @@
 //!
 //! Source: W3C MathML Core, Candidate Recommendation.
 
-use crate::grammar::{Binary, Kind, Nodes, Place};
+use crate::grammar::{Binary, Kind, NodeId, Nodes};
 
 /// How tightly a node holds: one in a place that asks for more stands in brackets.
 /// Cases end with their last line, so that whatever stands behind would read as a part of it.
@@ -37,7 +37,7 @@ pub enum Operand {
 
 /// An expression, without the element `math` around it.
 #[must_use]
-pub fn expression(nodes: &Nodes, root: Place, operand: Operand) -> String {
+pub fn expression(nodes: &Nodes, root: NodeId, operand: Operand) -> String {
     let least = match operand {
         Operand::None => 0,
         Operand::FirstTerm => SUM,
@@ -81,13 +81,13 @@ pub fn bracketed(inner: &str) -> String {
     format!("{mo}(</mo>{inner}{mo})</mo>")
 }
 
-fn at_least(nodes: &Nodes, place: Place, least: u8) -> String {
+fn at_least(nodes: &Nodes, place: NodeId, least: u8) -> String {
     let (written, holds) = written(nodes, place);
     if holds < least { row(&bracketed(&written)) } else { written }
 }
 
 /// A node and how tightly it holds.
-fn written(nodes: &Nodes, place: Place) -> (String, u8) {
+fn written(nodes: &Nodes, place: NodeId) -> (String, u8) {
     match &nodes.get(place).kind {
         Kind::Number(si, unit) => {
             let value = unit.as_ref().map_or(*si, |unit| si / unit.factor);
@@ -109,7 +109,7 @@ fn written(nodes: &Nodes, place: Place) -> (String, u8) {
     }
 }
 
-fn binary(nodes: &Nodes, operator: Binary, [left, right]: [Place; 2]) -> (String, u8) {
+fn binary(nodes: &Nodes, operator: Binary, [left, right]: [NodeId; 2]) -> (String, u8) {
     let (sign, holds, [of_left, of_right]) = match operator {
         Binary::Divide => {
             let [over, under] = [left, right].map(|part| row(&at_least(nodes, part, 0)));
@@ -138,8 +138,8 @@ fn binary(nodes: &Nodes, operator: Binary, [left, right]: [Place; 2]) -> (String
     (row(&format!("{left}<mo>{sign}</mo>{right}")), holds)
 }
 
-fn call(nodes: &Nodes, function: &str, arguments: &[Place]) -> (String, u8) {
-    let of = |place: &Place| at_least(nodes, *place, 0);
+fn call(nodes: &Nodes, function: &str, arguments: &[NodeId]) -> (String, u8) {
+    let of = |place: &NodeId| at_least(nodes, *place, 0);
     match (function, arguments) {
         ("sqrt", [inner]) => (format!("<msqrt>{}</msqrt>", of(inner)), ATOM),
         ("abs", [inner]) => {
@@ -148,7 +148,7 @@ fn call(nodes: &Nodes, function: &str, arguments: &[Place]) -> (String, u8) {
         ("exp", [inner]) => (format!("<msup><mi>e</mi>{}</msup>", row(&of(inner))), POWER),
         ("if", [condition, yes, no]) => {
             let line =
-                |value: &Place, when: &str| format!("<mtr><mtd>{}</mtd><mtd>{when}</mtd></mtr>", of(value));
+                |value: &NodeId, when: &str| format!("<mtr><mtd>{}</mtd><mtd>{when}</mtd></mtr>", of(value));
             let condition = row(&format!("<mtext>if </mtext>{}", of(condition)));
             let lines = line(yes, &condition) + &line(no, "<mtext>otherwise</mtext>");
             (row(&format!("<mo>{{</mo><mtable>{lines}</mtable>")), CASES)

@@ -6,7 +6,7 @@
 
 use crate::curve::Curve;
 use crate::inputs::Inputs;
-use crate::past::Past;
+use crate::past::History;
 
 /// What an operation does with its operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -40,16 +40,16 @@ pub enum Code {
     /// The table of this number at the first operand.
     Table(u16),
     /// The input of this number, the first operand earlier.
-    Delayed(u16),
+    DelayedInput(u16),
     /// The state, memory or direction in this register, the first operand earlier.
-    Past(u32),
+    DelayedLeaf(u32),
 }
 
-/// What operations read beside their operands.
-pub(crate) struct Around<'a> {
+/// What operations read in addition to their operands.
+pub(crate) struct EvaluationContext<'a> {
     pub(crate) time_s: f64,
     pub(crate) inputs: &'a Inputs<'a>,
-    pub(crate) past: &'a Past,
+    pub(crate) history: &'a History,
     pub(crate) curves: &'a [Curve],
 }
 
@@ -92,7 +92,7 @@ impl Code {
 
     /// Result for these operands.
     #[inline]
-    pub(crate) fn value(self, [a, b, c]: [f64; 3], around: &Around<'_>) -> f64 {
+    pub(crate) fn value(self, [a, b, c]: [f64; 3], context: &EvaluationContext<'_>) -> f64 {
         let truth = |is_true: bool| f64::from(u8::from(is_true));
         match self {
             Code::Add => a + b,
@@ -141,9 +141,9 @@ impl Code {
                     c
                 }
             }
-            Code::Table(number) => around.curves[usize::from(number)].at(a).0,
-            Code::Delayed(input) => around.inputs.between(usize::from(input), around.time_s - a).0,
-            Code::Past(leaf) => around.past.value(leaf, around.time_s - a)[0],
+            Code::Table(number) => context.curves[usize::from(number)].at(a).0,
+            Code::DelayedInput(input) => context.inputs.between(usize::from(input), context.time_s - a).0,
+            Code::DelayedLeaf(leaf) => context.history.value(leaf, context.time_s - a)[0],
         }
     }
 
@@ -154,7 +154,7 @@ impl Code {
         [a, b, _]: [f64; 3],
         value: f64,
         wanted: [bool; 3],
-        around: &Around<'_>,
+        context: &EvaluationContext<'_>,
     ) -> [f64; 3] {
         match self {
             Code::Add => [1.0, 1.0, 0.0],
@@ -177,11 +177,11 @@ impl Code {
             Code::Atan => [1.0 / (1.0 + a * a), 0.0, 0.0],
             Code::Select if a != 0.0 => [0.0, 1.0, 0.0],
             Code::Select => [0.0, 0.0, 1.0],
-            Code::Table(number) => [around.curves[usize::from(number)].at(a).1, 0.0, 0.0],
-            Code::Delayed(input) => {
-                [-around.inputs.between(usize::from(input), around.time_s - a).1, 0.0, 0.0]
+            Code::Table(number) => [context.curves[usize::from(number)].at(a).1, 0.0, 0.0],
+            Code::DelayedInput(input) => {
+                [-context.inputs.between(usize::from(input), context.time_s - a).1, 0.0, 0.0]
             }
-            Code::Past(leaf) => [-around.past.value(leaf, around.time_s - a)[1], 0.0, 0.0],
+            Code::DelayedLeaf(leaf) => [-context.history.value(leaf, context.time_s - a)[1], 0.0, 0.0],
             Code::Sign
             | Code::Floor
             | Code::Less

@@ -13,12 +13,12 @@ use crate::tape::Register;
 /// Coefficients of a step's polynomial.
 pub const TERMS: usize = 5;
 
-/// Nothing is kept.
-pub static NONE: Past = Past::none();
+/// History without leaves.
+pub static NONE: History = History::none();
 
-/// What is kept of some leaves. Of a leaf it keeps rows of its value and of its derivatives.
+/// Earlier values of some leaves, and their derivatives.
 #[derive(Clone, Debug, Default)]
-pub struct Past {
+pub struct History {
     leaves: Vec<Register>,
     /// A value and its derivatives.
     width: usize,
@@ -30,11 +30,11 @@ pub struct Past {
     count: usize,
     /// The step behind the last one is being tried.
     is_open: bool,
-    /// On which side of the instant between two steps a time lies, s.
-    side_s: f64,
+    /// Added to a time to decide which of two steps it belongs to at their boundary, s.
+    boundary_offset_s: f64,
 }
 
-impl Past {
+impl History {
     const fn none() -> Self {
         Self {
             leaves: Vec::new(),
@@ -45,7 +45,7 @@ impl Past {
             first: 0,
             count: 0,
             is_open: false,
-            side_s: 0.0,
+            boundary_offset_s: 0.0,
         }
     }
 
@@ -56,7 +56,7 @@ impl Past {
         Self { start: vec![0.0; leaves.len() * width], leaves, width, ..Self::none() }
     }
 
-    /// Whether nothing is kept.
+    /// Whether it has no leaves.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.leaves.is_empty()
@@ -121,9 +121,9 @@ impl Past {
         self.rows_mut(self.count, place)
     }
 
-    /// Of times that are the end of a step, but for rounding, the rate is that behind it (a small time above 0) or before it.
-    pub fn lean(&mut self, side_s: f64) {
-        self.side_s = side_s;
+    /// At the boundary of two steps the rate is that of the later step (a small offset above 0) or of the earlier one (below 0).
+    pub fn set_boundary_offset(&mut self, boundary_offset_s: f64) {
+        self.boundary_offset_s = boundary_offset_s;
     }
 
     /// The open step is no longer tried.
@@ -156,7 +156,7 @@ impl Past {
         // The first step that ends at the time or later; the last one where there is none.
         while range.start < range.end {
             let middle = range.start.midpoint(range.end);
-            if self.times_s[self.slot(middle)][1] < time_s + self.side_s {
+            if self.times_s[self.slot(middle)][1] < time_s + self.boundary_offset_s {
                 range.start = middle + 1;
             } else {
                 range.end = middle;
@@ -166,7 +166,7 @@ impl Past {
         let [from_s, to_s] = self.times_s[slot];
         let length_s = to_s - from_s;
         let share = (time_s - from_s) / length_s;
-        let is_before = range.start == 0 && time_s + self.side_s <= from_s;
+        let is_before = range.start == 0 && time_s + self.boundary_offset_s <= from_s;
         (!is_before).then_some((slot, share.clamp(0.0, 1.0), length_s))
     }
 
@@ -218,11 +218,11 @@ mod tests {
     use super::*;
 
     /// Steps of 1 s along t^2, of which the derivative by a number is 3 t.
-    fn square(past: &mut Past, steps: u32, needed_s: impl Fn(f64) -> f64) {
+    fn square(history: &mut History, steps: u32, needed_s: impl Fn(f64) -> f64) {
         for step in 0..steps {
             let from_s = f64::from(step);
-            past.open([from_s, from_s + 1.0], needed_s(from_s));
-            let rows = past.open_rows_mut(0);
+            history.open([from_s, from_s + 1.0], needed_s(from_s));
+            let rows = history.open_rows_mut(0);
             rows.fill(0.0);
             // t^2 over the step: the chord, and twice the rate at its head less the chord.
             let chord = 2.0 * from_s + 1.0;
@@ -234,55 +234,55 @@ mod tests {
                 2.0 * from_s - chord,
                 0.0,
             ]);
-            past.accept();
+            history.accept();
         }
     }
 
     #[test]
     fn values_rates_and_slopes_are_those_of_the_steps() {
-        let mut past = Past::of(vec![7], 1);
-        past.begin(2);
-        past.start_mut(0).copy_from_slice(&[-1.0, 5.0]);
+        let mut history = History::of(vec![7], 1);
+        history.begin(2);
+        history.start_mut(0).copy_from_slice(&[-1.0, 5.0]);
         // The ring is doubled where all steps are needed.
-        square(&mut past, 6, |_| 0.0);
-        assert!(past.room() >= 6);
+        square(&mut history, 6, |_| 0.0);
+        assert!(history.room() >= 6);
         for time_s in [0.25, 1.0, 2.5, 5.75] {
-            let [value, rate] = past.value(7, time_s);
+            let [value, rate] = history.value(7, time_s);
             assert!((value - time_s * time_s).abs() < 1e-12, "{time_s}: {value}");
             assert!((rate - 2.0 * time_s).abs() < 1e-12, "{time_s}: {rate}");
             let mut slope = [1.0];
-            past.add_slopes(7, time_s, &mut slope);
+            history.add_slopes(7, time_s, &mut slope);
             assert!((slope[0] - 1.0 - 3.0 * time_s).abs() < 1e-12, "{time_s}: {slope:?}");
         }
-        assert_eq!(past.value(7, -3.0), [-1.0, 0.0]);
+        assert_eq!(history.value(7, -3.0), [-1.0, 0.0]);
         let mut slope = [0.0];
-        past.add_slopes(7, -3.0, &mut slope);
+        history.add_slopes(7, -3.0, &mut slope);
         assert_eq!(slope, [5.0]);
-        assert!(past.value(7, f64::NAN)[0].is_nan());
+        assert!(history.value(7, f64::NAN)[0].is_nan());
         // At the start it is level before and rises behind.
-        let mut line = Past::of(vec![7], 0);
+        let mut line = History::of(vec![7], 0);
         line.begin(1);
         line.open([2.0, 4.0], 0.0);
         line.open_rows_mut(0).copy_from_slice(&[0.0, 6.0, 0.0, 0.0, 0.0]);
         line.accept();
-        for (side_s, rate) in [(1e-9, 3.0), (-1e-9, 0.0)] {
-            line.lean(side_s);
+        for (boundary_offset_s, rate) in [(1e-9, 3.0), (-1e-9, 0.0)] {
+            line.set_boundary_offset(boundary_offset_s);
             assert_eq!(line.value(7, 2.0), [0.0, rate]);
         }
     }
 
     #[test]
     fn a_ring_forgets_what_is_no_longer_needed_and_what_is_not_accepted() {
-        let mut past = Past::of(vec![7], 1);
-        past.begin(4);
-        square(&mut past, 100, |from_s| from_s - 1.5);
-        assert_eq!(past.room(), 4);
-        assert!((past.value(7, 98.5)[0] - 98.5 * 98.5).abs() < 1e-9);
-        past.open([100.0, 101.0], 98.0);
-        past.open_rows_mut(0).copy_from_slice(&[1e4, 0.0, 10.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
-        assert_eq!(past.value(7, 100.5)[0], 10_005.0);
-        past.close();
+        let mut history = History::of(vec![7], 1);
+        history.begin(4);
+        square(&mut history, 100, |from_s| from_s - 1.5);
+        assert_eq!(history.room(), 4);
+        assert!((history.value(7, 98.5)[0] - 98.5 * 98.5).abs() < 1e-9);
+        history.open([100.0, 101.0], 98.0);
+        history.open_rows_mut(0).copy_from_slice(&[1e4, 0.0, 10.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(history.value(7, 100.5)[0], 10_005.0);
+        history.close();
         // The end of the last step.
-        assert_eq!(past.value(7, 100.5)[0], 1e4);
+        assert_eq!(history.value(7, 100.5)[0], 1e4);
     }
 }

@@ -14,9 +14,9 @@
 
 use crate::curve::Curve;
 use crate::inputs::Inputs;
-use crate::operation::Around;
 pub use crate::operation::Code;
-use crate::past::{NONE, Past};
+use crate::operation::EvaluationContext;
+use crate::past::{History, NONE};
 use std::collections::HashMap;
 
 /// Place of an intermediate result.
@@ -28,16 +28,16 @@ struct Operation {
     operands: [Register; 3],
 }
 
-/// Numbers of registers that hold what comes from outside.
+/// Counts of the registers that are set from outside: the leaves. They follow register 0, the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Leaves {
+pub struct LeafLayout {
     pub inputs: usize,
     pub states: usize,
     pub parameters: usize,
     pub memories: usize,
 }
 
-impl Leaves {
+impl LeafLayout {
     pub fn input(self, index: usize) -> Register {
         (1 + index) as Register
     }
@@ -63,7 +63,7 @@ impl Leaves {
 
 /// Collects operations, each once.
 pub struct Builder {
-    pub leaves: Leaves,
+    pub leaves: LeafLayout,
     constants: Vec<f64>,
     operations: Vec<Operation>,
     known: HashMap<Operation, Register>,
@@ -73,7 +73,7 @@ pub struct Builder {
 const CONSTANTS: usize = 2 * crate::grammar::MOST_NODES;
 
 impl Builder {
-    pub fn new(leaves: Leaves) -> Self {
+    pub fn new(leaves: LeafLayout) -> Self {
         Self { leaves, constants: Vec::new(), operations: Vec::new(), known: HashMap::new() }
     }
 
@@ -156,7 +156,7 @@ impl Builder {
 
     /// Whether a register depends on parameters and constants alone.
     #[must_use]
-    pub fn is_of_numbers(&self, register: Register) -> bool {
+    pub fn is_constant(&self, register: Register) -> bool {
         match (register as usize).checked_sub(self.leaves.count() + CONSTANTS) {
             Some(operation) => self.fixed()[operation],
             None => {
@@ -176,7 +176,7 @@ impl Builder {
                 Some(before) => fixed[before],
                 None => parameters.contains(operand) || *operand as usize >= self.leaves.count(),
             };
-            let reads_time = matches!(operation.code, Code::Delayed(_) | Code::Past(_));
+            let reads_time = matches!(operation.code, Code::DelayedInput(_) | Code::DelayedLeaf(_));
             let count = operation.code.operands();
             fixed.push(!reads_time && operation.operands[..count].iter().all(is_fixed));
         }
@@ -187,7 +187,7 @@ impl Builder {
 /// Operations in their order, and where their results stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tape {
-    pub leaves: Leaves,
+    pub leaves: LeafLayout,
     constants: Vec<f64>,
     operations: Vec<Operation>,
     /// The first so many depend on parameters and constants alone.
@@ -200,7 +200,7 @@ pub struct Tape {
 const LANES: usize = 4;
 
 /// Which operands of an operation have derivatives.
-type Reached = [bool; 3];
+type ActiveOperands = [bool; 3];
 
 /// Values and derivatives of the registers of a tape.
 #[derive(Clone, Debug)]
@@ -211,8 +211,8 @@ pub struct Registers {
     directions: usize,
     /// Groups of a register.
     width: usize,
-    /// Of each operation; `None` where nothing reaches it.
-    reached: Vec<Option<Reached>>,
+    /// Of each operation; `None` where no operand has derivatives.
+    active_operands: Vec<Option<ActiveOperands>>,
 }
 
 impl Registers {
@@ -224,18 +224,18 @@ impl Registers {
         let mut active: Vec<bool> =
             (0..leaves as Register).map(|leaf| directions > 0 && is_active(leaf)).collect();
         active.resize(leaves + tape.constants.len(), false);
-        let mut reached = Vec::with_capacity(tape.operations.len());
+        let mut active_operands = Vec::with_capacity(tape.operations.len());
         for operation in &tape.operations {
             let count = operation.code.operands();
             let mut operands = operation.operands.map(|operand| active[operand as usize]);
             operands[count..].fill(false);
-            let is_past = directions > 0 && matches!(operation.code, Code::Past(_));
+            let is_past = directions > 0 && matches!(operation.code, Code::DelayedLeaf(_));
             let is_active = is_past || !operation.code.is_flat() && operands.contains(&true);
             active.push(is_active);
-            reached.push(is_active.then_some(operands));
+            active_operands.push(is_active.then_some(operands));
         }
         let width = directions.div_ceil(LANES);
-        Self { values, slopes: vec![[0.0; LANES]; count * width], directions, width, reached }
+        Self { values, slopes: vec![[0.0; LANES]; count * width], directions, width, active_operands }
     }
 
     #[inline]
@@ -278,15 +278,15 @@ impl Tape {
     }
 
     /// Computes all other registers from the leaves that were set.
-    pub fn evaluate(&self, registers: &mut Registers, inputs: &Inputs<'_>, past: &Past) {
-        self.compute_some(registers, self.fixed..self.operations.len(), (inputs, past));
+    pub fn evaluate(&self, registers: &mut Registers, inputs: &Inputs<'_>, history: &History) {
+        self.compute_some(registers, self.fixed..self.operations.len(), (inputs, history));
     }
 
     /// The leaves of which it reads earlier values, each with the register of by how much they are earlier, which
     /// [`Tape::prepare`] computes.
-    pub fn pasts(&self) -> impl Iterator<Item = (Register, Register)> + '_ {
+    pub fn delayed_leaves(&self) -> impl Iterator<Item = (Register, Register)> + '_ {
         self.operations.iter().filter_map(|operation| match operation.code {
-            Code::Past(leaf) => Some((leaf, operation.operands[0])),
+            Code::DelayedLeaf(leaf) => Some((leaf, operation.operands[0])),
             _ => None,
         })
     }
@@ -296,21 +296,22 @@ impl Tape {
         &self,
         registers: &mut Registers,
         which: core::ops::Range<usize>,
-        (inputs, past): (&Inputs<'_>, &Past),
+        (inputs, history): (&Inputs<'_>, &History),
     ) {
         let first = self.leaves.count() + self.constants.len() + which.start;
-        let around = Around { time_s: registers.values[0], inputs, past, curves: &self.curves };
+        let context =
+            EvaluationContext { time_s: registers.values[0], inputs, history, curves: &self.curves };
         for (place, operation) in self.operations[which.clone()].iter().enumerate() {
             let operands = operation.operands.map(|operand| operand as usize);
             let [a, b, c] = operands.map(|operand| registers.values[operand]);
-            let value = operation.code.value([a, b, c], &around);
+            let value = operation.code.value([a, b, c], &context);
             registers.values[first + place] = value;
-            if let Some(reached) = registers.reached[which.start + place] {
-                let partial = operation.code.partials([a, b, c], value, reached, &around);
-                carry(registers, first + place, operands, reached, partial);
-                if let Code::Past(leaf) = operation.code {
+            if let Some(active_operands) = registers.active_operands[which.start + place] {
+                let partial = operation.code.partials([a, b, c], value, active_operands, &context);
+                carry(registers, first + place, operands, active_operands, partial);
+                if let Code::DelayedLeaf(leaf) = operation.code {
                     let slopes = registers.slope_mut((first + place) as Register);
-                    past.add_slopes(leaf, around.time_s - a, slopes);
+                    history.add_slopes(leaf, context.time_s - a, slopes);
                 }
             }
         }
@@ -337,11 +338,15 @@ impl Tape {
     #[must_use]
     pub fn compute(&self, registers: &mut [f64]) -> f64 {
         let first = self.leaves.count() + self.constants.len();
-        let around =
-            Around { time_s: registers[0], inputs: &Inputs::none(), past: &NONE, curves: &self.curves };
+        let context = EvaluationContext {
+            time_s: registers[0],
+            inputs: &Inputs::none(),
+            history: &NONE,
+            curves: &self.curves,
+        };
         for (place, operation) in self.operations.iter().enumerate() {
             let operands = operation.operands.map(|operand| registers[operand as usize]);
-            registers[first + place] = operation.code.value(operands, &around);
+            registers[first + place] = operation.code.value(operands, &context);
         }
         registers[self.results[0] as usize]
     }
@@ -352,7 +357,7 @@ fn carry(
     registers: &mut Registers,
     result: usize,
     operands: [usize; 3],
-    reached: Reached,
+    active_operands: ActiveOperands,
     partial: [f64; 3],
 ) {
     let width = registers.width;
@@ -360,7 +365,7 @@ fn carry(
     let target = &mut at[..width];
     let mut is_first = true;
     for (place, (operand, factor)) in operands.into_iter().zip(partial).enumerate() {
-        if factor == 0.0 || !reached[place] {
+        if factor == 0.0 || !active_operands[place] {
             continue;
         }
         let source = &below[operand * width..][..width];
@@ -384,7 +389,7 @@ mod tests {
 
     /// One operation of two parameters, its value and its derivatives.
     fn computed(code: Code, a: f64, b: f64) -> (f64, [f64; 2]) {
-        let leaves = Leaves { parameters: 3, ..Leaves::default() };
+        let leaves = LeafLayout { parameters: 3, ..LeafLayout::default() };
         let mut builder = Builder::new(leaves);
         let operands = [0, 1, 2].map(|index| leaves.parameter(index));
         let result = builder.push(code, &operands);
@@ -454,7 +459,7 @@ mod tests {
 
     #[test]
     fn equal_operations_share_a_register() {
-        let leaves = Leaves { parameters: 2, ..Leaves::default() };
+        let leaves = LeafLayout { parameters: 2, ..LeafLayout::default() };
         let mut builder = Builder::new(leaves);
         let operands = [leaves.parameter(0), leaves.parameter(1)];
         let first = builder.push(Code::Multiply, &operands);

@@ -8,10 +8,10 @@ use crate::rows::{reads_inputs_alone, reads_numbers_alone};
 use crate::units::{Dimension, Unit};
 use expression::constants::constants;
 use expression::dimensions::{Dimensions, Measure};
-use expression::grammar::{Kind, Node, Place, Wrong};
+use expression::grammar::{ExpressionError, Kind, Node, NodeId};
 use std::collections::HashMap;
 
-pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
+pub(crate) fn check(model: &Model) -> Result<(), ExpressionError> {
     let mut dimensions = Checker { model, known: HashMap::new(), open: Vec::new() };
     for index in 0..model.definitions.len() {
         dimensions.definition(index, 0)?;
@@ -59,7 +59,7 @@ pub(crate) fn check(model: &Model) -> Result<(), Wrong> {
 }
 
 /// Refuses a delay by a constant below 0, which would read what is still to come.
-fn delays_look_back(model: &Model, constants: &[Option<f64>]) -> Result<(), Wrong> {
+fn delays_look_back(model: &Model, constants: &[Option<f64>]) -> Result<(), ExpressionError> {
     for node in model.nodes.all() {
         if let Kind::Call(name, arguments) = &node.kind
             && name == "delay"
@@ -67,7 +67,7 @@ fn delays_look_back(model: &Model, constants: &[Option<f64>]) -> Result<(), Wron
             && let Some(value) = constants[*by as usize].filter(|value| *value < 0.0)
         {
             let why = format!("delay: {value} s looks into the future: a delay is at least 0");
-            return Err(Wrong::new(model.nodes.get(*by).at, why));
+            return Err(ExpressionError::new(model.nodes.get(*by).at, why));
         }
     }
     Ok(())
@@ -94,13 +94,13 @@ pub(crate) fn suspect_unit(model: &Model, index: usize) -> Unit {
 }
 
 /// The dimension of an expression of the model's own names; that of 0 is none.
-pub(crate) fn dimension(model: &Model, root: Place) -> Result<Dimension, Wrong> {
+pub(crate) fn dimension(model: &Model, root: NodeId) -> Result<Dimension, ExpressionError> {
     let mut dimensions = Checker { model, known: HashMap::new(), open: Vec::new() };
     Ok(dimensions.node(root, None)?.unwrap_or_default())
 }
 
 /// The dimension of what stands at a place; of a state that of its rate.
-pub(crate) fn target_dimension(model: &Model, target: Target) -> Result<Dimension, Wrong> {
+pub(crate) fn target_dimension(model: &Model, target: Target) -> Result<Dimension, ExpressionError> {
     Checker { model, known: HashMap::new(), open: Vec::new() }.target(target)
 }
 
@@ -117,11 +117,11 @@ impl Checker<'_> {
         suspect: Option<usize>,
         wanted: Dimension,
         what: &str,
-    ) -> Result<(), Wrong> {
+    ) -> Result<(), ExpressionError> {
         self.expression(expression.root, suspect, wanted, (expression.at, what))
     }
 
-    fn target(&mut self, target: Target) -> Result<Dimension, Wrong> {
+    fn target(&mut self, target: Target) -> Result<Dimension, ExpressionError> {
         let model = self.model;
         Ok(match target {
             Target::Input(index) => model.inputs[index].unit.dimension,
@@ -131,16 +131,16 @@ impl Checker<'_> {
         })
     }
 
-    fn definition(&mut self, index: usize, at: usize) -> Result<Measure, Wrong> {
+    fn definition(&mut self, index: usize, at: usize) -> Result<Measure, ExpressionError> {
         if let Some(known) = self.known.get(&index) {
             return Ok(*known);
         }
         let definition = &self.model.definitions[index];
         if self.open.contains(&index) {
-            return Err(Wrong::new(at, format!("{} depends on itself", definition.name)));
+            return Err(ExpressionError::new(at, format!("{} depends on itself", definition.name)));
         }
         if self.open.len() >= DEEPEST_CHAIN {
-            return Err(Wrong::new(at, chain()));
+            return Err(ExpressionError::new(at, chain()));
         }
         self.open.push(index);
         let mut measure = self.node(definition.value.root, definition.suspect)?;
@@ -158,11 +158,11 @@ impl Dimensions for Checker<'_> {
     /// The suspect that the expression belongs to.
     type Scope = Option<usize>;
 
-    fn at(&self, place: Place) -> Node {
+    fn at(&self, place: NodeId) -> Node {
         self.model.nodes.get(place).clone()
     }
 
-    fn named(&mut self, name: &str, at: usize, suspect: Option<usize>) -> Result<Measure, Wrong> {
+    fn named(&mut self, name: &str, at: usize, suspect: Option<usize>) -> Result<Measure, ExpressionError> {
         let model = self.model;
         Ok(Some(match resolve(model, name, suspect, at)? {
             Symbol::Time => Dimension::TIME,
@@ -191,7 +191,7 @@ impl Dimensions for Checker<'_> {
         ", delay, and the tables"
     }
 
-    fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure, Wrong> {
+    fn called(&mut self, name: &str, measures: &[Measure], at: usize) -> Result<Measure, ExpressionError> {
         if let Some(table) = self.model.tables.iter().find(|table| table.name == name) {
             self.takes(name, measures[0], table.from.dimension, at)?;
             return Ok(Some(table.to.dimension));

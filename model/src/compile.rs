@@ -7,9 +7,9 @@
 use crate::file::{Change, Expression, Memory, Model, Parameter, State, Suspect, Target};
 use crate::inputs::Inputs;
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, name_of, resolve};
-use crate::tape::{Builder, Code, Leaves, Register, Registers, Tape};
+use crate::tape::{Builder, Code, LeafLayout, Register, Registers, Tape};
 use expression::compile::Compile;
-use expression::grammar::{Kind, Node, Place, Wrong};
+use expression::grammar::{ExpressionError, Kind, Node, NodeId};
 use expression::past::NONE;
 use std::collections::HashMap;
 
@@ -30,8 +30,8 @@ pub(crate) struct Tapes {
     pub(crate) frictions: Vec<usize>,
 }
 
-fn leaves(model: &Model) -> Leaves {
-    Leaves {
+fn leaves(model: &Model) -> LeafLayout {
+    LeafLayout {
         inputs: model.inputs.len(),
         states: model.states.len(),
         parameters: model.parameters.len(),
@@ -40,7 +40,7 @@ fn leaves(model: &Model) -> Leaves {
 }
 
 /// Where the direction of a friction stands: 1 or -1 where it slides, 0 where it holds.
-pub(crate) fn direction_of(leaves: Leaves, model: &Model, friction: usize) -> Register {
+pub(crate) fn direction_of(leaves: LeafLayout, model: &Model, friction: usize) -> Register {
     leaves.memory(model.memories.len() + friction)
 }
 
@@ -48,14 +48,14 @@ pub(crate) fn direction_of(leaves: Leaves, model: &Model, friction: usize) -> Re
 fn tape<'a>(
     model: &'a Model,
     suspects: &'a [usize],
-    results: impl FnOnce(&mut Compiler<'a>) -> Result<Vec<Register>, Wrong>,
-) -> Result<Tape, Wrong> {
+    results: impl FnOnce(&mut Compiler<'a>) -> Result<Vec<Register>, ExpressionError>,
+) -> Result<Tape, ExpressionError> {
     let mut compiler = Compiler::new(model, suspects);
     let results = results(&mut compiler)?;
     Ok(compiler.builder.tape(&results, model.tables.iter().map(|table| table.curve.clone()).collect()))
 }
 
-pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
+pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, ExpressionError> {
     let is_there = |owner: Option<usize>| model.is_there(owner, suspects);
     let states: Vec<usize> =
         (0..model.states.len()).filter(|index| is_there(model.states[*index].suspect)).collect();
@@ -88,11 +88,11 @@ pub(crate) fn tapes(model: &Model, suspects: &[usize]) -> Result<Tapes, Wrong> {
 }
 
 /// Whether the force of each friction stands in the equation of its speed, and in a way that says which force holds it.
-pub(crate) fn frictions_hold(model: &Model, suspects: &[usize]) -> Result<(), Wrong> {
+pub(crate) fn frictions_hold(model: &Model, suspects: &[usize]) -> Result<(), ExpressionError> {
     for (index, friction) in model.frictions.iter().enumerate() {
         let mut compiler = Compiler::new(model, suspects);
         let force = direction_of(compiler.builder.leaves, model, index);
-        let rate = compiler.held((index, force))?;
+        let rate = compiler.rate_under_force((index, force))?;
         let (name, state) = (&friction.name, &model.states[friction.velocity].name);
         let why = match compiler.builder.degree(rate, force) {
             Some(0) => format!("the equation of {state} does not read {name}, which is to hold it"),
@@ -101,7 +101,7 @@ pub(crate) fn frictions_hold(model: &Model, suspects: &[usize]) -> Result<(), Wr
                 format!("the equation of {state} is not linear in {name}: no force is known that holds it")
             }
         };
-        return Err(Wrong::new(model.states[friction.velocity].derivative.at, why));
+        return Err(ExpressionError::new(model.states[friction.velocity].derivative.at, why));
     }
     Ok(())
 }
@@ -136,7 +136,7 @@ impl Model {
 
 /// Whether a suspect at an input is one that delays it.
 pub(crate) fn delays_its_place(model: &Model, suspect: usize) -> bool {
-    let is_place = |argument: Place| match &model.nodes.get(argument).kind {
+    let is_place = |argument: NodeId| match &model.nodes.get(argument).kind {
         Kind::Name(name) => resolve(model, name, Some(suspect), 0) == Ok(Symbol::Before(suspect)),
         _ => false,
     };
@@ -162,20 +162,20 @@ struct Compiler<'a> {
     known: HashMap<Symbol, Register>,
     /// Symbols that are being computed: one that comes again depends on itself.
     open: Vec<Symbol>,
-    /// The friction of whose speed the rate is computed, and the force that it has there; and at which earlier instant.
+    /// The friction of whose speed the rate is computed, with its assumed force; and the delay at which it is computed.
     held: Option<(usize, Register)>,
-    held_by: Option<Register>,
-    earlier: Earlier,
+    held_delay: Option<Register>,
+    instant: DelayedInstant,
 }
 
-/// An earlier instant, at which what is delayed is computed with all that it is made of.
+/// The earlier instant at which the argument of a delay is computed, with all that it reads.
 #[derive(Default)]
-struct Earlier {
-    /// By how much it is earlier, and where the file says so.
-    by: Option<(Register, usize)>,
-    /// What is known there, for each delay.
+struct DelayedInstant {
+    /// Register of the delay, and the byte of the file at which it stands; `None` for the present.
+    delay: Option<(Register, usize)>,
+    /// Registers of symbols that were computed already, for each delay.
     known: HashMap<(Register, Symbol), Register>,
-    /// How many were computed: delays of delays multiply.
+    /// Delays that were computed: delays of delays multiply.
     count: usize,
 }
 
@@ -185,26 +185,26 @@ const MOST_DELAYS: usize = 1000;
 impl<'a> Compiler<'a> {
     fn new(model: &'a Model, suspects: &'a [usize]) -> Self {
         let builder = Builder::new(leaves(model));
-        let earlier = Earlier::default();
+        let instant = DelayedInstant::default();
         let (known, open) = (HashMap::new(), Vec::new());
-        Self { model, suspects, builder, known, open, held: None, held_by: None, earlier }
+        Self { model, suspects, builder, known, open, held: None, held_delay: None, instant }
     }
 
     /// A state, a memory or the direction of a friction, at the instant that is computed.
-    fn kept(&mut self, leaf: Register, name: &str) -> Result<Register, Wrong> {
-        let Some((by, at)) = self.earlier.by else { return Ok(leaf) };
-        if !self.builder.is_of_numbers(by) {
+    fn leaf_at_instant(&mut self, leaf: Register, name: &str) -> Result<Register, ExpressionError> {
+        let Some((by, at)) = self.instant.delay else { return Ok(leaf) };
+        if !self.builder.is_constant(by) {
             let why = format!("delay: the time by which {name} is late reads parameters and numbers alone");
-            return Err(Wrong::new(at, why));
+            return Err(ExpressionError::new(at, why));
         }
-        Ok(self.builder.push(Code::Past(leaf), &[by]))
+        Ok(self.builder.push(Code::DelayedLeaf(leaf), &[by]))
     }
 
-    fn rate(&mut self, state: usize) -> Result<Register, Wrong> {
+    fn rate(&mut self, state: usize) -> Result<Register, ExpressionError> {
         let model = self.model;
         let State { derivative, suspect, .. } = &model.states[state];
         let base = self.node(derivative.root, Scope { suspect: *suspect, before: None })?;
-        let rate = self.changed(Target::State(state), base, None)?;
+        let rate = self.with_suspects(Target::State(state), base, None)?;
         let holds = |index: &usize| {
             let friction = &model.frictions[*index];
             friction.velocity == state && model.is_there(friction.suspect, self.suspects)
@@ -213,7 +213,7 @@ impl<'a> Compiler<'a> {
             // Exactly at rest, where the sum of forces would leave a rounding error.
             Some(friction) if self.held.is_none() => {
                 let direction = direction_of(self.builder.leaves, model, friction);
-                let direction = self.kept(direction, &model.frictions[friction].name)?;
+                let direction = self.leaf_at_instant(direction, &model.frictions[friction].name)?;
                 let zero = self.builder.constant(0.0);
                 Ok(self.builder.push(Code::Select, &[direction, rate, zero]))
             }
@@ -221,30 +221,30 @@ impl<'a> Compiler<'a> {
         }
     }
 
-    /// The rate of a friction's speed where this is its force.
-    fn held(&mut self, held: (usize, Register)) -> Result<Register, Wrong> {
+    /// The rate of a friction's speed under an assumed friction force.
+    fn rate_under_force(&mut self, held: (usize, Register)) -> Result<Register, ExpressionError> {
         let known = core::mem::take(&mut self.known);
-        let known_earlier = core::mem::take(&mut self.earlier.known);
+        let known_at_instant = core::mem::take(&mut self.instant.known);
         let open = core::mem::take(&mut self.open);
         self.held = Some(held);
-        self.held_by = self.earlier.by.map(|(by, _)| by);
+        self.held_delay = self.instant.delay.map(|(by, _)| by);
         let rate = self.rate(self.model.frictions[held.0].velocity);
         self.held = None;
-        (self.known, self.earlier.known, self.open) = (known, known_earlier, open);
+        (self.known, self.instant.known, self.open) = (known, known_at_instant, open);
         rate
     }
 
     /// The force that holds a friction's speed, and what a unit of force does to its rate.
-    fn holding(&mut self, friction: usize) -> Result<[Register; 2], Wrong> {
+    fn holding_force(&mut self, friction: usize) -> Result<[Register; 2], ExpressionError> {
         let [zero, one] = [0.0, 1.0].map(|force| self.builder.constant(force));
-        let without = self.held((friction, zero))?;
-        let with_one = self.held((friction, one))?;
+        let without = self.rate_under_force((friction, zero))?;
+        let with_one = self.rate_under_force((friction, one))?;
         let braked = self.builder.push(Code::Subtract, &[without, with_one]);
         Ok([self.builder.push(Code::Divide, &[without, braked]), braked])
     }
 
-    fn guards(&mut self, friction: usize) -> Result<[Register; 3], Wrong> {
-        let [holding, braked] = self.holding(friction)?;
+    fn guards(&mut self, friction: usize) -> Result<[Register; 3], ExpressionError> {
+        let [holding, braked] = self.holding_force(friction)?;
         let element = &self.model.frictions[friction];
         let scope = Scope { suspect: element.suspect, before: None };
         let sliding = self.node(element.sliding.root, scope)?;
@@ -255,45 +255,45 @@ impl<'a> Compiler<'a> {
     }
 
     /// The force of a friction: what holds, or the sliding force against the motion.
-    fn force(&mut self, friction: usize, at: usize) -> Result<Register, Wrong> {
+    fn force(&mut self, friction: usize, at: usize) -> Result<Register, ExpressionError> {
         let model = self.model;
         let element = &model.frictions[friction];
-        let by = self.earlier.by.map(|(by, _)| by);
+        let by = self.instant.delay.map(|(by, _)| by);
         match self.held {
-            Some((held, _)) if by != self.held_by => {
+            Some((held, _)) if by != self.held_delay => {
                 let state = &model.states[model.frictions[held].velocity].name;
                 let why = format!("the equation of {state} reads an earlier {}", element.name);
-                return Err(Wrong::new(at, why));
+                return Err(ExpressionError::new(at, why));
             }
             Some((held, force)) if held == friction => return Ok(force),
             Some((held, _)) => {
                 let state = &model.states[model.frictions[held].velocity].name;
                 let why = format!("the equation of {state} reads {} beside its own friction", element.name);
-                return Err(Wrong::new(at, why));
+                return Err(ExpressionError::new(at, why));
             }
             None => {}
         }
         let direction = direction_of(self.builder.leaves, model, friction);
-        let direction = self.kept(direction, &element.name)?;
-        let [holding, _] = self.holding(friction)?;
+        let direction = self.leaf_at_instant(direction, &element.name)?;
+        let [holding, _] = self.holding_force(friction)?;
         let sliding = self.node(element.sliding.root, Scope { suspect: element.suspect, before: None })?;
         let sliding = self.builder.push(Code::Multiply, &[direction, sliding]);
         Ok(self.builder.push(Code::Select, &[direction, sliding, holding]))
     }
 
     /// What the file says of a place, without terms and suspects; of a state it is its value, not its rate.
-    fn base(&mut self, target: Target) -> Result<Register, Wrong> {
+    fn base(&mut self, target: Target) -> Result<Register, ExpressionError> {
         let model = self.model;
         let (root, suspect) = match target {
             Target::Input(index) => {
-                return Ok(match self.earlier.by {
+                return Ok(match self.instant.delay {
                     None => self.builder.leaves.input(index),
-                    Some((by, _)) => self.builder.push(Code::Delayed(index as u16), &[by]),
+                    Some((by, _)) => self.builder.push(Code::DelayedInput(index as u16), &[by]),
                 });
             }
             Target::State(index) => {
                 let leaf = self.builder.leaves.state(index);
-                return self.kept(leaf, &model.states[index].name);
+                return self.leaf_at_instant(leaf, &model.states[index].name);
             }
             Target::Definition(index) => {
                 let definition = &model.definitions[index];
@@ -307,13 +307,18 @@ impl<'a> Compiler<'a> {
         self.node(root, Scope { suspect, before: None })
     }
 
-    fn whole(&mut self, target: Target, until: Option<usize>) -> Result<Register, Wrong> {
+    fn target_value(&mut self, target: Target, until: Option<usize>) -> Result<Register, ExpressionError> {
         let base = self.base(target)?;
-        self.changed(target, base, until)
+        self.with_suspects(target, base, until)
     }
 
     /// A value with the suspects at its place, or with those that act before this one.
-    fn changed(&mut self, target: Target, base: Register, until: Option<usize>) -> Result<Register, Wrong> {
+    fn with_suspects(
+        &mut self,
+        target: Target,
+        base: Register,
+        until: Option<usize>,
+    ) -> Result<Register, ExpressionError> {
         let mut value = base;
         for index in self.model.changes_of(target, self.suspects) {
             let suspect = &self.model.suspects[index];
@@ -331,11 +336,11 @@ impl<'a> Compiler<'a> {
         Ok(value)
     }
 
-    fn symbol(&mut self, symbol: Symbol, at: usize) -> Result<Register, Wrong> {
+    fn symbol(&mut self, symbol: Symbol, at: usize) -> Result<Register, ExpressionError> {
         let leaves = self.builder.leaves;
-        let known = match &self.earlier.by {
+        let known = match &self.instant.delay {
             None => self.known.get(&symbol),
-            Some((by, _)) => self.earlier.known.get(&(*by, symbol)),
+            Some((by, _)) => self.instant.known.get(&(*by, symbol)),
         };
         if let Some(register) = known {
             return Ok(*register);
@@ -343,40 +348,44 @@ impl<'a> Compiler<'a> {
         if let Some(first) = self.open.iter().position(|open| *open == symbol) {
             let circle: Vec<&str> =
                 self.open[first..].iter().map(|open| name_of(self.model, *open)).collect();
-            return Err(Wrong::new(
+            return Err(ExpressionError::new(
                 at,
                 format!("{} depends on itself by way of {}", circle[0], circle.join(", ")),
             ));
         }
         if self.open.len() >= DEEPEST_CHAIN {
-            return Err(Wrong::new(at, chain()));
+            return Err(ExpressionError::new(at, chain()));
         }
         self.open.push(symbol);
         let register = match symbol {
-            Symbol::Time => match &self.earlier.by {
+            Symbol::Time => match &self.instant.delay {
                 None => 0,
                 Some((by, _)) => self.builder.push(Code::Subtract, &[0, *by]),
             },
             Symbol::Pi => self.builder.constant(core::f64::consts::PI),
-            Symbol::Input(index) => self.whole(Target::Input(index), None)?,
-            Symbol::State(index) => self.kept(leaves.state(index), name_of(self.model, symbol))?,
+            Symbol::Input(index) => self.target_value(Target::Input(index), None)?,
+            Symbol::State(index) => self.leaf_at_instant(leaves.state(index), name_of(self.model, symbol))?,
             Symbol::Parameter(index) => leaves.parameter(index),
-            Symbol::Memory(index) => self.kept(leaves.memory(index), name_of(self.model, symbol))?,
+            Symbol::Memory(index) => {
+                self.leaf_at_instant(leaves.memory(index), name_of(self.model, symbol))?
+            }
             Symbol::Friction(index) => self.force(index, at)?,
-            Symbol::Definition(index) => self.whole(Target::Definition(index), None)?,
-            Symbol::Output(index) => self.whole(Target::Output(index), None)?,
-            Symbol::Before(suspect) => self.whole(self.model.suspects[suspect].target, Some(suspect))?,
+            Symbol::Definition(index) => self.target_value(Target::Definition(index), None)?,
+            Symbol::Output(index) => self.target_value(Target::Output(index), None)?,
+            Symbol::Before(suspect) => {
+                self.target_value(self.model.suspects[suspect].target, Some(suspect))?
+            }
         };
         self.open.pop();
-        match &self.earlier.by {
+        match &self.instant.delay {
             None => self.known.insert(symbol, register),
-            Some((by, _)) => self.earlier.known.insert((*by, symbol), register),
+            Some((by, _)) => self.instant.known.insert((*by, symbol), register),
         };
         Ok(register)
     }
 
     /// How much earlier: never later. A number whose range is its own bound, any other value counts as 0 where it is below.
-    fn duration(&mut self, by: Place, scope: Scope) -> Result<Register, Wrong> {
+    fn duration(&mut self, by: NodeId, scope: Scope) -> Result<Register, ExpressionError> {
         let model = self.model;
         let node = model.nodes.get(by);
         let register = self.node(by, scope)?;
@@ -389,7 +398,7 @@ impl<'a> Compiler<'a> {
             if smallest < 0.0 {
                 let (smallest, unit) = ((smallest / unit.factor) as f32, &unit.text);
                 let why = format!("delay: '{name}' may be {smallest} {unit}: a delay is at least 0");
-                return Err(Wrong::new(node.at, why));
+                return Err(ExpressionError::new(node.at, why));
             }
             if *least >= 0.0 {
                 return Ok(register);
@@ -400,24 +409,32 @@ impl<'a> Compiler<'a> {
     }
 
     /// An expression some time earlier, with the terms and suspects that change what it reads.
-    fn delayed(&mut self, [delayed, by]: [Place; 2], at: usize, scope: Scope) -> Result<Register, Wrong> {
+    fn delayed(
+        &mut self,
+        [delayed, by]: [NodeId; 2],
+        at: usize,
+        scope: Scope,
+    ) -> Result<Register, ExpressionError> {
         let late_at = self.model.nodes.get(by).at;
-        self.earlier.count += 1;
-        if self.earlier.count > MOST_DELAYS {
-            return Err(Wrong::new(at, format!("more than {MOST_DELAYS} delays, those of delays included")));
+        self.instant.count += 1;
+        if self.instant.count > MOST_DELAYS {
+            return Err(ExpressionError::new(
+                at,
+                format!("more than {MOST_DELAYS} delays, those of delays included"),
+            ));
         }
         let by = self.duration(by, scope)?;
-        let outer = self.earlier.by.take();
-        self.earlier.by = Some(match outer {
+        let outer = self.instant.delay.take();
+        self.instant.delay = Some(match outer {
             None => (by, late_at),
             Some((outer, outer_at)) => {
-                let is_outer = !self.builder.is_of_numbers(outer);
+                let is_outer = !self.builder.is_constant(outer);
                 let both = self.builder.push(Code::Add, &[outer, by]);
                 (both, if is_outer { outer_at } else { late_at })
             }
         });
         let register = self.node(delayed, Scope { before: None, ..scope });
-        self.earlier.by = outer;
+        self.instant.delay = outer;
         register
     }
 }
@@ -425,7 +442,7 @@ impl<'a> Compiler<'a> {
 impl Compile for Compiler<'_> {
     type Scope = Scope;
 
-    fn at(&self, place: Place) -> Node {
+    fn at(&self, place: NodeId) -> Node {
         self.model.nodes.get(place).clone()
     }
 
@@ -433,7 +450,7 @@ impl Compile for Compiler<'_> {
         &mut self.builder
     }
 
-    fn named(&mut self, name: &str, at: usize, scope: Scope) -> Result<Register, Wrong> {
+    fn named(&mut self, name: &str, at: usize, scope: Scope) -> Result<Register, ExpressionError> {
         match (resolve(self.model, name, scope.suspect, at)?, scope.before) {
             (Symbol::Before(_), Some(before)) => Ok(before),
             (symbol, _) => self.symbol(symbol, at),
@@ -443,10 +460,10 @@ impl Compile for Compiler<'_> {
     fn called(
         &mut self,
         name: &str,
-        arguments: &[Place],
+        arguments: &[NodeId],
         at: usize,
         scope: Scope,
-    ) -> Result<Option<Register>, Wrong> {
+    ) -> Result<Option<Register>, ExpressionError> {
         if name == "delay" {
             return self.delayed([arguments[0], arguments[1]], at, scope).map(Some);
         }

@@ -7,7 +7,7 @@ use crate::read;
 use crate::rows::Rows;
 use crate::units::Unit;
 pub use expression::curve::Table;
-use expression::grammar::{Nodes, Place};
+use expression::grammar::{NodeId, Nodes};
 use expression::mathml::Operand;
 use settings::SettingsError;
 use std::path::{Path, PathBuf};
@@ -94,7 +94,7 @@ pub enum Solver {
 pub struct Expression {
     /// As it is written in the file.
     pub text: String,
-    pub(crate) root: Place,
+    pub(crate) root: NodeId,
     pub(crate) at: usize,
 }
 

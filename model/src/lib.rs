@@ -35,7 +35,7 @@ mod rows;
 mod simulate;
 
 pub use expression::compile::RESERVED;
-pub use expression::grammar::is_of_name;
+pub use expression::grammar::is_name_character;
 pub use expression::grammar::{DEEPEST, MOST_NODES};
 pub use expression::inputs::{Hold, Inputs};
 pub use expression::mathml::{Operand, bracketed as in_brackets, name as mathml_name};
@@ -46,7 +46,8 @@ pub use file::{
     Smoothing, Solver, Start, State, Suspect, Table, Target,
 };
 pub use library::{
-    Entry, EntryFriction, EntryMemory, EntryParameter, EntryState, Found, Library, Quantity, Variable,
+    Entry, EntryFriction, EntryMemory, EntryParameter, EntryState, Library, LibrarySuspect, Quantity,
+    Variable,
 };
 pub use rows::Rows;
 pub use simulate::{Direction, Program, Simulator};

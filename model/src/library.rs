@@ -10,7 +10,7 @@
 
 mod user;
 
-pub use user::Found;
+pub use user::LibrarySuspect;
 
 use crate::file::Change;
 use crate::read::named;

@@ -1,7 +1,7 @@
 //! What names in expressions mean: quantities of the model, and functions.
 
 use crate::file::{Model, Target};
-use expression::grammar::Wrong;
+use expression::grammar::ExpressionError;
 
 /// Definitions that stand in each other; with the depth of each it bounds the stack.
 pub(crate) const DEEPEST_CHAIN: usize = 32;
@@ -74,7 +74,12 @@ fn numbered<'a>(
     names.enumerate().map(move |(index, (name, suspect))| (symbol(index), name, suspect))
 }
 
-pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usize) -> Result<Symbol, Wrong> {
+pub(crate) fn resolve(
+    model: &Model,
+    name: &str,
+    suspect: Option<usize>,
+    at: usize,
+) -> Result<Symbol, ExpressionError> {
     match name {
         "t" => return Ok(Symbol::Time),
         "pi" => return Ok(Symbol::Pi),
@@ -83,7 +88,7 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
     if let Some(name) = name.strip_prefix(OWN) {
         let mut own = named_parts(model).filter(|(_, _, of)| of.is_some() && *of == suspect);
         let found = own.find(|(_, other, _)| *other == name).map(|(symbol, ..)| symbol);
-        return found.ok_or_else(|| Wrong::new(at, format!("'{name}' is unknown")));
+        return found.ok_or_else(|| ExpressionError::new(at, format!("'{name}' is unknown")));
     }
     let owner = suspect.and_then(|index| model.suspects.get(index));
     // The file's own names alone may stand in what a suspect of a library is bound to.
@@ -100,6 +105,6 @@ pub(crate) fn resolve(model: &Model, name: &str, suspect: Option<usize>, at: usi
     parts.find(|(_, other, _)| *other == name).map(|(symbol, ..)| symbol).ok_or_else(|| {
         let parts = named_parts(model).filter(|(_, _, of)| seen(*of));
         let known: Vec<&str> = parts.map(|(_, name, _)| name.as_str()).take(30).collect();
-        Wrong::new(at, format!("'{name}' is unknown here; known are t, pi, {}", known.join(", ")))
+        ExpressionError::new(at, format!("'{name}' is unknown here; known are t, pi, {}", known.join(", ")))
     })
 }

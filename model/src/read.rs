@@ -11,7 +11,7 @@ use crate::names::named_parts;
 use crate::rows::Rows;
 use crate::units::{Dimension, Unit};
 use expression::compile::RESERVED;
-use expression::grammar::{Nodes, is_of_name};
+use expression::grammar::{Nodes, is_name_character};
 use settings::{Result, Section, Source, Text};
 use std::path::Path;
 
@@ -231,7 +231,7 @@ impl Reader<'_> {
     /// A name that is new, is one, and means nothing else.
     fn is_new(&self, name: &str, suspect: Option<usize>, section: &Section<'_>) -> Result<()> {
         let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
-        if !begins || !name.chars().all(is_of_name) || name.chars().count() > 64 {
+        if !begins || !name.chars().all(is_name_character) || name.chars().count() > 64 {
             let allowed =
                 "a name has letters, digits and _, begins with no digit, and has at most 64 of them";
             return Err(section.wrong(allowed));

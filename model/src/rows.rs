@@ -7,7 +7,7 @@
 
 use crate::file::{Expression, Model};
 use crate::names::{Symbol, resolve};
-use expression::grammar::{Kind, Place, Wrong};
+use expression::grammar::{ExpressionError, Kind, NodeId};
 
 /// Rows that count.
 #[derive(Clone, Debug)]
@@ -43,7 +43,7 @@ impl Default for Rows {
 }
 
 /// Refuses an expression that cannot be computed before the model is.
-pub(crate) fn reads_inputs_alone(model: &Model, root: Place) -> Result<(), Wrong> {
+pub(crate) fn reads_inputs_alone(model: &Model, root: NodeId) -> Result<(), ExpressionError> {
     let is_known = |symbol| match symbol {
         Symbol::Time | Symbol::Pi | Symbol::Input(_) => true,
         Symbol::Parameter(index) => model.parameters[index].is_one_constant(),
@@ -53,21 +53,25 @@ pub(crate) fn reads_inputs_alone(model: &Model, root: Place) -> Result<(), Wrong
 }
 
 /// Refuses an expression that reads more than numbers: what a memory is before the first sample.
-pub(crate) fn reads_numbers_alone(model: &Model, root: Place, suspect: Option<usize>) -> Result<(), Wrong> {
+pub(crate) fn reads_numbers_alone(
+    model: &Model,
+    root: NodeId,
+    suspect: Option<usize>,
+) -> Result<(), ExpressionError> {
     let is_number = |symbol| matches!(symbol, Symbol::Pi | Symbol::Parameter(_));
     reads_alone((model, root, suspect), is_number, "the start of a memory reads parameters alone")
 }
 
 fn reads_alone(
-    (model, root, suspect): (&Model, Place, Option<usize>),
+    (model, root, suspect): (&Model, NodeId, Option<usize>),
     is_allowed: impl Fn(Symbol) -> bool,
     why: &str,
-) -> Result<(), Wrong> {
+) -> Result<(), ExpressionError> {
     for node in model.nodes.tree(root) {
         if let Kind::Name(name) = &node.kind
             && !is_allowed(resolve(model, name, suspect, node.at)?)
         {
-            return Err(Wrong::new(node.at, format!("'{name}': {why}")));
+            return Err(ExpressionError::new(node.at, format!("'{name}': {why}")));
         }
     }
     Ok(())

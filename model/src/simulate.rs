@@ -28,9 +28,9 @@ use crate::compile::{Tapes, direction_of, tapes};
 use crate::failure::Failure;
 use crate::file::{Model, Solver};
 use crate::inputs::{Hold, Inputs};
-use crate::tape::{Leaves, Register, Registers, Tape};
-use delays::Kept;
-use expression::past::Past;
+use crate::tape::{LeafLayout, Register, Registers, Tape};
+use delays::DelayedQuantity;
+use expression::past::History;
 use settings::SettingsError;
 
 /// Stages of Dormand-Prince.
@@ -53,16 +53,16 @@ pub struct Program {
     tapes: Tapes,
     solver: Solver,
     holds: Vec<Hold>,
-    names: Names,
+    names: PartNames,
     /// Of each friction the place of its speed among the states, and the register of its direction.
     held: Vec<(usize, Register)>,
     /// Of each state whether derivatives take it as given.
     is_given: Vec<bool>,
 }
 
-/// What messages call the parts, with the places of their equations.
+/// Names of the parts in messages, with the places of their equations.
 #[derive(Clone, Debug)]
-struct Names {
+struct PartNames {
     states: Vec<(String, String)>,
     outputs: Vec<(String, String)>,
     frictions: Vec<(String, String)>,
@@ -83,7 +83,7 @@ impl Program {
             let friction = &model.frictions[*index];
             (friction.name.clone(), model.place_of(&friction.sliding))
         };
-        let names = Names {
+        let names = PartNames {
             states: tapes.states.iter().map(state).collect(),
             outputs: model.outputs.iter().map(|one| (one.name.clone(), model.place_of(&one.value))).collect(),
             frictions: tapes.frictions.iter().map(friction).collect(),
@@ -121,7 +121,7 @@ impl Program {
         &self.tapes.states
     }
 
-    fn leaves(&self) -> Leaves {
+    fn leaves(&self) -> LeafLayout {
         self.tapes.rates.leaves
     }
 }
@@ -155,9 +155,9 @@ pub struct Simulator<'a> {
     memory_in_two: Vec<f64>,
     largest_memory: Vec<f64>,
     middle: Vec<f64>,
-    /// What has earlier values, and these.
-    kept: Vec<(Register, Kept)>,
-    past: Past,
+    /// Leaves of which earlier values are kept, and these values.
+    delayed: Vec<(Register, DelayedQuantity)>,
+    history: History,
     memory_at_head: Vec<f64>,
     memory_within: [Vec<f64>; 3],
     /// Delays that rates and memories read; the least of them, and the longest of all.
@@ -195,7 +195,7 @@ impl<'a> Simulator<'a> {
         let width = 1 + directions.len();
         let room = vec![0.0; program.tapes.states.len() * width];
         let memory = vec![0.0; program.tapes.memories.len() * width];
-        let kept = program.kept();
+        let delayed = program.delayed_quantities();
         Self {
             program,
             directions: directions.to_vec(),
@@ -219,8 +219,8 @@ impl<'a> Simulator<'a> {
             memory,
             largest_memory: vec![0.0; program.tapes.memories.len()],
             middle: room.clone(),
-            past: Past::of(kept.iter().map(|(leaf, _)| *leaf).collect(), directions.len()),
-            kept,
+            history: History::of(delayed.iter().map(|(leaf, _)| *leaf).collect(), directions.len()),
+            delayed,
             delays_s: Vec::with_capacity(program.delays()),
             least_delay_s: 0.0,
             longest_delay_s: 0.0,
@@ -316,7 +316,7 @@ impl<'a> Simulator<'a> {
     ) -> Result<(), Failure> {
         let program = self.program;
         put(program, &mut self.outputs, inputs, (row, inputs.time_s[row]), &self.x);
-        program.tapes.outputs.evaluate(&mut self.outputs, inputs, &self.past);
+        program.tapes.outputs.evaluate(&mut self.outputs, inputs, &self.history);
         for (output, (name, place)) in program.names.outputs.iter().enumerate() {
             let register = program.tapes.outputs.result(output);
             let value = self.outputs.value(register);

@@ -3,7 +3,7 @@
 //! A term stands in the equation of its place. One at an input has none, and one that reads the value of its place without it
 //! would be read as a circle: these stand by themselves, with an arrow. Each equation has its plain text as title.
 
-use model::{Change, Expression, Model, Operand, Target, in_brackets, is_of_name, mathml_name};
+use model::{Change, Expression, Model, Operand, Target, in_brackets, is_name_character, mathml_name};
 use pagekit::page::escaped;
 
 /// Most bytes of an equation that is set; a longer one is easier to read in the file.
@@ -146,7 +146,7 @@ impl Typeset<'_> {
         let suspect = &self.model.suspects[index];
         let name = self.model.target_name(suspect.target);
         !matches!(suspect.target, Target::State(_))
-            && suspect.expression.text.split(|letter| !is_of_name(letter)).any(|word| word == name)
+            && suspect.expression.text.split(|letter| !is_name_character(letter)).any(|word| word == name)
     }
 
     /// What is of a named suspect, on the ground of marked text; that of a term of the file is not.

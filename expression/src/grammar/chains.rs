@@ -5,7 +5,7 @@
 //!   a - b + … z  ──► (a - b + …) + (… z), and so on       longer: as deep as its logarithm
 //! ```
 
-use super::{Binary, Kind, Nodes, Place, Result};
+use super::{Binary, Kind, NodeId, Nodes, Result};
 
 #[derive(Clone, Copy)]
 pub(super) enum Operator {
@@ -19,14 +19,14 @@ pub(super) enum Operator {
 pub(super) struct Operand {
     pub(super) operator: Operator,
     pub(super) at: usize,
-    pub(super) place: Place,
+    pub(super) place: NodeId,
 }
 
 /// Chains of as many operators are halved; shorter ones are computed from left to right.
 const LONGEST: usize = 32;
 
 impl Operator {
-    fn between(self, left: Place, right: Place) -> Kind {
+    fn between(self, left: NodeId, right: NodeId) -> Kind {
         match self {
             Operator::Plain(binary) => Kind::Binary(binary, left, right),
             Operator::Swapped(binary) => Kind::Binary(binary, right, left),
@@ -53,7 +53,7 @@ impl Operator {
 impl Nodes {
     /// Operands between operators of one level, from left to right; a long chain is halved, so that a flat sum of a thousand
     /// terms is ten deep.
-    pub(super) fn chain(&mut self, first: Place, rest: &[Operand]) -> Result<Place> {
+    pub(super) fn chain(&mut self, first: NodeId, rest: &[Operand]) -> Result<NodeId> {
         if rest.len() >= LONGEST && rest.iter().all(|operand| operand.operator.turn().is_some()) {
             return self.halved(first, rest);
         }
@@ -62,7 +62,7 @@ impl Nodes {
         })
     }
 
-    fn halved(&mut self, first: Place, rest: &[Operand]) -> Result<Place> {
+    fn halved(&mut self, first: NodeId, rest: &[Operand]) -> Result<NodeId> {
         let middle = rest.len() / 2;
         let Some(Operand { operator, at, place }) = rest.get(middle).copied() else { return Ok(first) };
         let left = self.halved(first, &rest[..middle])?;

@@ -11,13 +11,13 @@ use std::path::Path;
 
 /// A suspect with its library.
 #[derive(Clone, Debug)]
-pub struct Found {
-    /// Where it stands.
+pub struct LibrarySuspect {
+    /// The library that has it.
     pub library: Cow<'static, Library>,
     place: usize,
 }
 
-impl Found {
+impl LibrarySuspect {
     /// The suspect in its library.
     #[must_use]
     pub fn entry(&self) -> &Entry {
@@ -31,7 +31,7 @@ impl Library {
     ///
     /// # Errors
     /// What is allowed, or what is wrong with the file.
-    pub fn find(used: &str, folder: &Path) -> Result<Found, String> {
+    pub fn find(used: &str, folder: &Path) -> Result<LibrarySuspect, String> {
         let (name, suspect) = used.rsplit_once('/').unwrap_or((used, ""));
         let library = if name.ends_with(".toml") {
             Cow::Owned(Self::of_user(name, &folder.join(name))?)
@@ -49,7 +49,7 @@ impl Library {
             let known: Vec<&str> = library.entries.iter().map(|entry| entry.name.as_str()).collect();
             return Err(format!("'{suspect}' is not in {name}; it has {}", known.join(", ")));
         };
-        Ok(Found { library, place })
+        Ok(LibrarySuspect { library, place })
     }
 
     /// Reads a library that a user keeps in a file.

@@ -3,38 +3,38 @@
 use super::Reader;
 use crate::check::{dimension, target_dimension};
 use crate::file::{Change, Expression, Memory, Parameter, Start, State, Suspect, Target};
-use crate::library::{Entry, EntryFriction, Found, Library, PLACE, Quantity};
+use crate::library::{Entry, EntryFriction, Library, LibrarySuspect, PLACE, Quantity};
 use crate::names::{Symbol, named_parts, own_name};
 use crate::units::{Dimension, Unit};
-use expression::grammar::{Kind, Place, Stands, Wrong, is_of_name, renamed};
+use expression::grammar::{Binding, ExpressionError, Kind, NodeId, is_name_character, renamed};
 use settings::{Result, Section, SettingsError, Text};
 use std::path::Path;
 
-/// Where a suspect of a library stands, and what it is bound to.
-struct Bound<'a> {
+/// A suspect of a library in a model, and what its variables are bound to.
+struct LibraryBinding<'a> {
     entry: &'a Entry,
     index: usize,
     target: Target,
     /// Where the file names the library: what goes wrong in its expressions goes wrong there.
     at: usize,
-    bound: Vec<(&'a str, Place)>,
-    /// What stands for each variable, as the file has it.
+    bound: Vec<(&'a str, NodeId)>,
+    /// Text that each variable is bound to, as the file has it.
     texts: Vec<(&'a str, String)>,
     /// Dimensions of the variables, of the place and of time.
     dimensions: Vec<(&'a str, Dimension)>,
 }
 
-impl Bound<'_> {
+impl LibraryBinding<'_> {
     fn unit(&self, quantity: &Quantity) -> (Unit, bool) {
         let of = |name: &str| self.dimensions.iter().find(|(other, _)| *other == name);
         quantity.unit_of(&|name| of(name).map_or(Dimension::NONE, |(_, dimension)| *dimension))
     }
 
-    /// What stands for a name of the library's expressions.
-    fn stands(&self, name: &str) -> Option<Stands> {
+    /// What is bound to a name of the library's expressions.
+    fn binding(&self, name: &str) -> Option<Binding> {
         let variable = self.bound.iter().find(|(variable, _)| *variable == name);
-        let own = || self.entry.has_own(name).then(|| Stands::Name(own_name(name)));
-        variable.map(|(_, place)| Stands::Expression(*place)).or_else(own)
+        let own = || self.entry.has_own(name).then(|| Binding::Name(own_name(name)));
+        variable.map(|(_, place)| Binding::Expression(*place)).or_else(own)
     }
 
     /// An expression of the library in the words of the file.
@@ -49,7 +49,7 @@ impl Bound<'_> {
 
 /// Where an expression is put in place of a name: in brackets unless it is a name, a number or a call.
 fn bracketed(text: &str) -> String {
-    let name = text.find(|character| !is_of_name(character)).unwrap_or(text.len());
+    let name = text.find(|character| !is_name_character(character)).unwrap_or(text.len());
     let mut depth = 0_i32;
     let closes = text.find(|character| {
         depth += i32::from(character == '(') - i32::from(character == ')');
@@ -126,7 +126,7 @@ impl Reader<'_> {
         })
     }
 
-    fn found(&self, used: &Text) -> Result<Found> {
+    fn found(&self, used: &Text) -> Result<LibrarySuspect> {
         let folder = self.model.file.parent().unwrap_or(Path::new(""));
         Library::find(&used.text, folder)
             .map_err(|why| self.source.wrong_from(used.at, &format!("use: {why}")))
@@ -147,7 +147,7 @@ impl Reader<'_> {
             ));
         }
         let (texts, dimensions) = (Vec::new(), vec![("time", Dimension::TIME)]);
-        let mut bound = Bound { entry, index, target, at, bound: Vec::new(), texts, dimensions };
+        let mut bound = LibraryBinding { entry, index, target, at, bound: Vec::new(), texts, dimensions };
         let mut of_place = target_dimension(&self.model, target).map_err(|wrong| self.wrong(&wrong))?;
         let times = match section.text("times")? {
             Some(_) if entry.change != Change::Add => {
@@ -196,7 +196,7 @@ impl Reader<'_> {
     }
 
     /// A friction of a library, which holds the state that its variable is bound to.
-    fn friction_of_library(&mut self, bound: &Bound<'_>, friction: &EntryFriction) -> Result<()> {
+    fn friction_of_library(&mut self, bound: &LibraryBinding<'_>, friction: &EntryFriction) -> Result<()> {
         let variable = &friction.velocity;
         let place = bound.bound.iter().find(|(name, _)| name == variable).map(|(_, place)| *place);
         let node = self.model.nodes.get(place.expect("a test binds each of a library")).clone();
@@ -210,7 +210,7 @@ impl Reader<'_> {
         self.friction(named, (&state, node.at), [sliding, breakaway], Some(bound.index))
     }
 
-    fn wrong(&self, wrong: &Wrong) -> SettingsError {
+    fn wrong(&self, wrong: &ExpressionError) -> SettingsError {
         self.source.wrong_from(wrong.at, &wrong.why)
     }
 
@@ -219,7 +219,7 @@ impl Reader<'_> {
         &mut self,
         section: &mut Section<'_>,
         library: &'b Library,
-        bound: &mut Bound<'b>,
+        bound: &mut LibraryBinding<'b>,
     ) -> Result<()> {
         let variables = library.variables_of(bound.entry);
         let mut with = section.section("with")?;
@@ -250,7 +250,12 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn put<'b>(&self, bound: &mut Bound<'b>, name: &'b str, (root, text): (Place, String)) -> Result<()> {
+    fn put<'b>(
+        &self,
+        bound: &mut LibraryBinding<'b>,
+        name: &'b str,
+        (root, text): (NodeId, String),
+    ) -> Result<()> {
         let measured = dimension(&self.model, root).map_err(|wrong| self.wrong(&wrong))?;
         bound.bound.push((name, root));
         bound.texts.push((name, text));
@@ -258,14 +263,14 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn of_library(&mut self, bound: &Bound<'_>, text: &str) -> Result<Expression> {
-        let root = self.model.nodes.parse_bound(text, bound.at, &|name| bound.stands(name));
+    fn of_library(&mut self, bound: &LibraryBinding<'_>, text: &str) -> Result<Expression> {
+        let root = self.model.nodes.parse_bound(text, bound.at, &|name| bound.binding(name));
         let root = root.map_err(|wrong| self.wrong(&wrong))?;
         Ok(Expression { text: bound.written(text), root, at: bound.at })
     }
 
     /// The numbers of a suspect of a library, with what the file says of them.
-    fn numbers(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<()> {
+    fn numbers(&mut self, section: &mut Section<'_>, bound: &LibraryBinding<'_>) -> Result<()> {
         let mut given = section.section("parameters")?;
         for number in &bound.entry.parameters {
             let (unit, is_usual) = bound.unit(&number.quantity);
@@ -307,7 +312,7 @@ impl Reader<'_> {
     }
 
     /// The states of a suspect of a library; the file may say where they start.
-    fn states(&mut self, section: &mut Section<'_>, bound: &Bound<'_>) -> Result<()> {
+    fn states(&mut self, section: &mut Section<'_>, bound: &LibraryBinding<'_>) -> Result<()> {
         let mut given = section.section("states")?;
         for state in &bound.entry.states {
             let mut unit = bound.unit(&state.quantity).0;

@@ -44,9 +44,9 @@ const RETURNS: u32 = 4;
 const STEPS_OF_A_SAMPLE: f64 = 4.0;
 const MOST_ROOM: f64 = 4096.0;
 
-/// What has earlier values.
+/// A quantity of which earlier values are kept, by its place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kept {
+pub(super) enum DelayedQuantity {
     State(usize),
     Memory(usize),
     Direction(usize),
@@ -56,23 +56,25 @@ impl Program {
     /// How many delays rates, memories and frictions read.
     pub(super) fn delays(&self) -> usize {
         let all = [&self.tapes.rates, &self.tapes.updates, &self.tapes.guards];
-        all.iter().map(|tape| tape.pasts().count()).sum()
+        all.iter().map(|tape| tape.delayed_leaves().count()).sum()
     }
 
     /// The leaves of which tapes read earlier values.
-    pub(super) fn kept(&self) -> Vec<(Register, Kept)> {
+    pub(super) fn delayed_quantities(&self) -> Vec<(Register, DelayedQuantity)> {
         let (tapes, leaves) = (&self.tapes, self.leaves());
         let all = [&tapes.rates, &tapes.outputs, &tapes.updates, &tapes.guards];
         let mut read: Vec<Register> =
-            all.iter().flat_map(|tape| tape.pasts().map(|(leaf, _)| leaf)).collect();
+            all.iter().flat_map(|tape| tape.delayed_leaves().map(|(leaf, _)| leaf)).collect();
         read.sort_unstable();
         read.dedup();
         let states = tapes.states.iter().enumerate();
-        let states = states.map(|(place, state)| (leaves.state(*state), Kept::State(place)));
+        let states = states.map(|(place, state)| (leaves.state(*state), DelayedQuantity::State(place)));
         let memories = tapes.memories.iter().enumerate();
-        let memories = memories.map(|(place, memory)| (leaves.memory(*memory), Kept::Memory(place)));
+        let memories =
+            memories.map(|(place, memory)| (leaves.memory(*memory), DelayedQuantity::Memory(place)));
         let directions = self.held.iter().enumerate();
-        let directions = directions.map(|(friction, (_, leaf))| (*leaf, Kept::Direction(friction)));
+        let directions =
+            directions.map(|(friction, (_, leaf))| (*leaf, DelayedQuantity::Direction(friction)));
         let known = states.chain(memories).chain(directions);
         known.filter(|(leaf, _)| read.binary_search(leaf).is_ok()).collect()
     }
@@ -81,7 +83,7 @@ impl Program {
 impl Simulator<'_> {
     /// The delays of a record, whose parameters are set, and room for what they reach back to.
     pub(super) fn begin_delays(&mut self, inputs: &Inputs<'_>) {
-        if self.past.is_empty() {
+        if self.history.is_empty() {
             return;
         }
         let tapes = &self.program.tapes;
@@ -89,10 +91,10 @@ impl Simulator<'_> {
         let both =
             [(&tapes.rates, &self.rates), (&tapes.updates, &self.updates), (&tapes.guards, &self.guards)];
         for (tape, registers) in both {
-            self.delays_s.extend(tape.pasts().map(|(_, by)| registers.value(by)));
+            self.delays_s.extend(tape.delayed_leaves().map(|(_, by)| registers.value(by)));
         }
         self.least_delay_s = self.delays_s.iter().copied().fold(f64::INFINITY, f64::min);
-        let outputs = tapes.outputs.pasts().map(|(_, by)| self.outputs.value(by));
+        let outputs = tapes.outputs.delayed_leaves().map(|(_, by)| self.outputs.value(by));
         self.longest_delay_s = self.delays_s.iter().copied().chain(outputs).fold(0.0, f64::max);
         self.delays_s.sort_unstable_by(f64::total_cmp);
         self.delays_s.dedup();
@@ -110,25 +112,31 @@ impl Simulator<'_> {
             Solver::Adaptive { .. } => STEPS_OF_A_SAMPLE,
         };
         let room = (of_a_sample + self.delays_s.len() as f64) * (samples as f64 + 2.0);
-        self.past.begin(room.min(MOST_ROOM) as usize);
-        for (place, (_, kept)) in self.kept.iter().enumerate() {
+        self.history.begin(room.min(MOST_ROOM) as usize);
+        for (place, (_, quantity)) in self.delayed.iter().enumerate() {
             let width = 1 + self.directions.len();
-            let start = self.past.start_mut(place);
+            let start = self.history.start_mut(place);
             start.fill(0.0);
-            match *kept {
-                Kept::State(state) if self.program.is_given[state] => start[0] = self.x[state * width],
-                Kept::State(state) => start.copy_from_slice(&self.x[state * width..(state + 1) * width]),
-                Kept::Memory(at) => start.copy_from_slice(&self.memory[at * width..(at + 1) * width]),
-                Kept::Direction(friction) => start[0] = self.direction[friction],
+            match *quantity {
+                DelayedQuantity::State(state) if self.program.is_given[state] => {
+                    start[0] = self.x[state * width]
+                }
+                DelayedQuantity::State(state) => {
+                    start.copy_from_slice(&self.x[state * width..(state + 1) * width])
+                }
+                DelayedQuantity::Memory(at) => {
+                    start.copy_from_slice(&self.memory[at * width..(at + 1) * width])
+                }
+                DelayedQuantity::Direction(friction) => start[0] = self.direction[friction],
             }
         }
     }
 
     /// Directions of friction before the first sample, which are those at it.
     pub(super) fn keep_directions(&mut self) {
-        for (place, (_, kept)) in self.kept.iter().enumerate() {
-            if let Kept::Direction(friction) = kept {
-                self.past.start_mut(place)[0] = self.direction[*friction];
+        for (place, (_, quantity)) in self.delayed.iter().enumerate() {
+            if let DelayedQuantity::Direction(friction) = quantity {
+                self.history.start_mut(place)[0] = self.direction[*friction];
             }
         }
     }
@@ -161,13 +169,13 @@ impl Simulator<'_> {
 
     /// What a step leads to, from the rates at its head. False where it reads itself and does not come to an end with that.
     pub(super) fn attempt(&mut self, inputs: &Inputs<'_>, (row, time_s): (usize, f64), step_s: f64) -> bool {
-        if self.past.is_empty() {
+        if self.history.is_empty() {
             self.scheme(inputs, (row, time_s), step_s);
             return true;
         }
         self.memory_at_head.copy_from_slice(&self.memory);
         if step_s <= self.least_delay_s {
-            self.past.close();
+            self.history.close();
             self.scheme(inputs, (row, time_s), step_s);
             self.write_step(time_s, step_s, false);
             return true;
@@ -199,13 +207,13 @@ impl Simulator<'_> {
 
     /// Writes the step that was tried behind those that were accepted; as the tangent at its head, where nothing was tried yet.
     fn write_step(&mut self, time_s: f64, step_s: f64, is_tangent: bool) {
-        self.past.open([time_s, time_s + step_s], time_s - self.longest_delay_s);
+        self.history.open([time_s, time_s + step_s], time_s - self.longest_delay_s);
         let width = self.width();
         let is_adaptive = matches!(self.program.solver, Solver::Adaptive { .. });
-        for (place, (_, kept)) in self.kept.iter().enumerate() {
-            let rows = self.past.open_rows_mut(place);
-            match *kept {
-                Kept::State(state) => {
+        for (place, (_, quantity)) in self.delayed.iter().enumerate() {
+            let rows = self.history.open_rows_mut(place);
+            match *quantity {
+                DelayedQuantity::State(state) => {
                     let columns = if self.program.is_given[state] { 1 } else { width };
                     rows.fill(0.0);
                     for column in 0..columns {
@@ -226,11 +234,11 @@ impl Simulator<'_> {
                         (0..TERMS).for_each(|term| rows[term * width + column] = terms[term]);
                     }
                 }
-                Kept::Memory(at) => {
+                DelayedQuantity::Memory(at) => {
                     rows.fill(0.0);
                     rows[..width].copy_from_slice(&self.memory_at_head[at * width..(at + 1) * width]);
                 }
-                Kept::Direction(friction) => {
+                DelayedQuantity::Direction(friction) => {
                     rows.fill(0.0);
                     rows[0] = self.direction[friction];
                 }
@@ -240,16 +248,16 @@ impl Simulator<'_> {
 
     /// Keeps the step that was tried, which is accepted, before its end becomes the head of the next one.
     pub(super) fn keep(&mut self, step_s: f64) {
-        if self.past.is_empty() {
+        if self.history.is_empty() {
             return;
         }
         if !self.memory.is_empty() {
             // What memories changed within the step was added to its end; stages between are overwritten.
             let width = self.width();
-            for (place, (_, kept)) in self.kept.iter().enumerate() {
-                let Kept::State(state) = *kept else { continue };
+            for (place, (_, quantity)) in self.delayed.iter().enumerate() {
+                let DelayedQuantity::State(state) = *quantity else { continue };
                 let columns = if self.program.is_given[state] { 1 } else { width };
-                let rows = self.past.open_rows_mut(place);
+                let rows = self.history.open_rows_mut(place);
                 for column in 0..columns {
                     let at = state * width + column;
                     let [head, end] = [0, STAGES - 1].map(|stage| step_s * self.stages[stage][at]);
@@ -260,9 +268,9 @@ impl Simulator<'_> {
         }
         if self.is_remembered() {
             let width = self.width();
-            for (place, (_, kept)) in self.kept.iter().enumerate() {
-                let Kept::Memory(at) = *kept else { continue };
-                let rows = self.past.open_rows_mut(place);
+            for (place, (_, quantity)) in self.delayed.iter().enumerate() {
+                let DelayedQuantity::Memory(at) = *quantity else { continue };
+                let rows = self.history.open_rows_mut(place);
                 for column in 0..width {
                     let at = at * width + column;
                     let within = &self.memory_within;
@@ -272,7 +280,7 @@ impl Simulator<'_> {
                 }
             }
         }
-        self.past.accept();
+        self.history.accept();
     }
 
     /// Memories are followed within a step.
@@ -282,8 +290,8 @@ impl Simulator<'_> {
 
     /// How far the earlier values of memories may be off, over their sizes: where one turns within the step.
     pub(super) fn error_of_memories(&self) -> f64 {
-        let errors = self.kept.iter().filter_map(|(_, kept)| match *kept {
-            Kept::Memory(place) => {
+        let errors = self.delayed.iter().filter_map(|(_, quantity)| match *quantity {
+            DelayedQuantity::Memory(place) => {
                 let size = self.largest_memory[place].max(f64::MIN_POSITIVE);
                 let at = place * self.width();
                 let [second, third, fourth] = [0, 1, 2].map(|part| self.memory_within[part][at]);
@@ -301,9 +309,9 @@ impl Simulator<'_> {
             return;
         }
         let width = self.width();
-        for (place, (_, kept)) in self.kept.iter().enumerate() {
-            let Kept::Memory(at) = *kept else { continue };
-            let Some(rows) = self.past.last_rows_mut(place) else { continue };
+        for (place, (_, quantity)) in self.delayed.iter().enumerate() {
+            let DelayedQuantity::Memory(at) = *quantity else { continue };
+            let Some(rows) = self.history.last_rows_mut(place) else { continue };
             let (from, rows) = rows.split_at_mut(width);
             let now = &self.memory[at * width..(at + 1) * width];
             rows.iter_mut().zip(now).zip(from).for_each(|((change, now), from)| *change = now - *from);

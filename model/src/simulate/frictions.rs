@@ -62,7 +62,7 @@ impl Simulator<'_> {
     fn guard(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), friction: usize) -> [f64; GUARDS] {
         let guards = &self.program.tapes.guards;
         put(self.program, &mut self.plain_guards, inputs, instant, &self.within);
-        guards.evaluate(&mut self.plain_guards, inputs, &self.past);
+        guards.evaluate(&mut self.plain_guards, inputs, &self.history);
         core::array::from_fn(|place| self.plain_guards.value(guards.result(GUARDS * friction + place)))
     }
 
@@ -222,7 +222,7 @@ impl Simulator<'_> {
         let direction = self.direction[friction];
         if direction == 0.0 {
             put(self.program, &mut self.guards, inputs, instant, &self.x);
-            self.program.tapes.guards.evaluate(&mut self.guards, inputs, &self.past);
+            self.program.tapes.guards.evaluate(&mut self.guards, inputs, &self.history);
             let guards = &self.program.tapes.guards;
             let [holding, breakaway] = [0, 1].map(|result| guards.result(GUARDS * friction + result));
             let sign = self.guards.value(holding).signum();

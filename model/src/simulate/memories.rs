@@ -60,15 +60,15 @@ impl Simulator<'_> {
     }
 
     /// Renews the memories at an instant with these states, which are those of `x`, `tried` or `middle`.
-    fn renew_at(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), place: At) {
+    fn renew_at(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), place: StepPoint) {
         let (program, width) = (self.program, self.width());
         let x = match place {
-            At::Head => &self.x,
-            At::Middle => &self.middle,
-            At::End => &self.tried,
+            StepPoint::Start => &self.x,
+            StepPoint::Middle => &self.middle,
+            StepPoint::End => &self.tried,
         };
         put(program, &mut self.updates, inputs, instant, x);
-        program.tapes.updates.evaluate(&mut self.updates, inputs, &self.past);
+        program.tapes.updates.evaluate(&mut self.updates, inputs, &self.history);
         for place in 0..program.tapes.memories.len() {
             let register = program.tapes.updates.result(place);
             let kept = &mut self.memory[place * width..(place + 1) * width];
@@ -80,7 +80,7 @@ impl Simulator<'_> {
 
     pub(super) fn renew(&mut self, inputs: &Inputs<'_>, instant: (usize, f64)) {
         if !self.memory.is_empty() {
-            self.renew_at(inputs, instant, At::Head);
+            self.renew_at(inputs, instant, StepPoint::Start);
             let width = self.width();
             for (largest, kept) in self.largest_memory.iter_mut().zip(self.memory.chunks_exact(width)) {
                 *largest = largest.max(kept[0].abs());
@@ -99,22 +99,22 @@ impl Simulator<'_> {
         let end = (row, time_s + step_s);
         self.between(step_s, 0.5);
         let middle = (row, time_s + 0.5 * step_s);
-        self.stage_at(inputs, middle, MIDDLE_BEFORE, At::Middle);
-        self.renew_at(inputs, middle, At::Middle);
-        self.renew_at(inputs, end, At::End);
+        self.stage_at(inputs, middle, MIDDLE_BEFORE, StepPoint::Middle);
+        self.renew_at(inputs, middle, StepPoint::Middle);
+        self.renew_at(inputs, end, StepPoint::End);
         self.memory_in_two.copy_from_slice(&self.memory);
         self.forget();
         for (part, share) in [0.25, 0.5, 0.75].into_iter().enumerate() {
             self.between(step_s, share);
             let instant = (row, time_s + share * step_s);
-            self.renew_at(inputs, instant, At::Middle);
+            self.renew_at(inputs, instant, StepPoint::Middle);
             self.memory_within[part].copy_from_slice(&self.memory);
             if share == 0.5 {
-                self.stage_at(inputs, instant, MIDDLE, At::Middle);
+                self.stage_at(inputs, instant, MIDDLE, StepPoint::Middle);
             }
         }
-        self.renew_at(inputs, end, At::End);
-        self.stage_at(inputs, end, END, At::End);
+        self.renew_at(inputs, end, StepPoint::End);
+        self.stage_at(inputs, end, END, StepPoint::End);
         let width = self.width();
         let mut worst = self.error_of_memories();
         for (place, largest) in self.largest_memory.iter().enumerate() {
@@ -132,7 +132,7 @@ impl Simulator<'_> {
             }
             self.tried[index] += step_s / 6.0 * (4.0 * in_middle + at_end);
         }
-        self.stage_at(inputs, end, MOVED, At::End);
+        self.stage_at(inputs, end, MOVED, StepPoint::End);
         for index in 0..self.tried.len() {
             let moved = step_s / 3.0 * (self.stages[MOVED][index] - self.stages[END][index]);
             if index % width == 0 {
@@ -163,9 +163,9 @@ impl Simulator<'_> {
 
 /// Where in a step rates and memories are evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum At {
+pub(super) enum StepPoint {
     /// With the states `x`.
-    Head,
+    Start,
     /// With the states `middle`.
     Middle,
     /// With the states `tried`.

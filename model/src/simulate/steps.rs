@@ -1,6 +1,6 @@
 //! Steps from a sample to the next one, by either method.
 
-use super::memories::At;
+use super::memories::StepPoint;
 use super::{MOST_STEPS, STAGES, Simulator, failure, put};
 use crate::failure::Failure;
 use crate::file::Solver;
@@ -147,7 +147,7 @@ impl Simulator<'_> {
         for (index, (tried, x)) in self.tried.iter_mut().zip(&self.x).enumerate() {
             *tried = x + step_s / 6.0 * (first[index] + 2.0 * (second[index] + third[index]) + fourth[index]);
         }
-        if !self.direction.is_empty() || !self.past.is_empty() {
+        if !self.direction.is_empty() || !self.history.is_empty() {
             self.stage(inputs, row, time_s + step_s, STAGES - 1, true);
         }
     }
@@ -259,20 +259,26 @@ impl Simulator<'_> {
 
     /// Rates at a stage, from `tried` or `x`.
     pub(super) fn stage(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64, stage: usize, tried: bool) {
-        self.stage_at(inputs, (row, time_s), stage, if tried { At::End } else { At::Head });
+        self.stage_at(inputs, (row, time_s), stage, if tried { StepPoint::End } else { StepPoint::Start });
     }
 
-    pub(super) fn stage_at(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), stage: usize, at: At) {
+    pub(super) fn stage_at(
+        &mut self,
+        inputs: &Inputs<'_>,
+        instant: (usize, f64),
+        stage: usize,
+        at: StepPoint,
+    ) {
         let program = self.program;
         let x = match at {
-            At::Head => &self.x,
-            At::Middle => &self.middle,
-            At::End => &self.tried,
+            StepPoint::Start => &self.x,
+            StepPoint::Middle => &self.middle,
+            StepPoint::End => &self.tried,
         };
         put(program, &mut self.rates, inputs, instant, x);
         let rounding_s = (ROUNDING * (instant.1.abs() + self.longest_delay_s)).max(f64::MIN_POSITIVE);
-        self.past.lean(if at == At::Head { rounding_s } else { -rounding_s });
-        program.tapes.rates.evaluate(&mut self.rates, inputs, &self.past);
+        self.history.set_boundary_offset(if at == StepPoint::Start { rounding_s } else { -rounding_s });
+        program.tapes.rates.evaluate(&mut self.rates, inputs, &self.history);
         let width = self.width();
         for place in 0..program.tapes.states.len() {
             let register = program.tapes.rates.result(place);

@@ -38,8 +38,8 @@ use crate::effects::sheet::PlaceKind;
 use crate::state::Axis;
 use expression::compile::RESERVED;
 use expression::curve::Table;
-use expression::formula::{Formula, Known, Variable};
-use expression::grammar::is_of_name;
+use expression::formula::{Formula, SymbolTable, Variable};
+use expression::grammar::is_name_character;
 use expression::units::Unit;
 use settings::{Result, Section, Source, Text};
 use std::fmt::Write as _;
@@ -160,7 +160,7 @@ fn tables(section: &mut Section<'_>, source: &Source<'_>) -> Result<Vec<Table>> 
 /// Refuses a key that no expression could read.
 fn is_name(section: &Section<'_>, name: &str) -> Result<()> {
     let begins = name.starts_with(|first: char| first.is_alphabetic() || first == '_');
-    if begins && name.chars().all(is_of_name) && name.chars().count() <= 64 {
+    if begins && name.chars().all(is_name_character) && name.chars().count() <= 64 {
         return Ok(());
     }
     Err(section.wrong_at(name, &format!("{name}: a name has letters, digits and _ alone")))
@@ -213,10 +213,10 @@ impl Reader<'_> {
             };
             Axis::ALL.into_iter().flat_map(one).collect()
         };
-        let known = || places().into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(", ");
-        let place = section.needed_text("place", &format!("what it adds to, one of {}", known()))?;
+        let symbols = || places().into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(", ");
+        let place = section.needed_text("place", &format!("what it adds to, one of {}", symbols()))?;
         let Some((_, axis, target)) = places().into_iter().find(|(name, ..)| *name == place.text) else {
-            let why = format!("place = \"{}\"; allowed is {}", place.text, known());
+            let why = format!("place = \"{}\"; allowed is {}", place.text, symbols());
             return Err(self.source.wrong_from(place.at, &why));
         };
         let library = used.as_ref().map(|used| used.at);
@@ -268,8 +268,8 @@ impl Reader<'_> {
             })
             .collect();
         let wanted = (dimension(target.unit()), place.text.as_str());
-        let known = Known { variables: &variables, parameters: &parameters, tables: &curves };
-        let formula = Formula::compile((&add, at), known, wanted).map_err(|wrong| {
+        let symbols = SymbolTable { variables: &variables, parameters: &parameters, tables: &curves };
+        let formula = Formula::compile((&add, at), symbols, wanted).map_err(|wrong| {
             match library {
                 // The expression is the library's, so that the file has no place of its parts.
                 Some(used) => self.source.wrong_from(used, &format!("{}, in {add}", wrong.why)),
@@ -284,7 +284,7 @@ impl Reader<'_> {
             .map(|one| {
                 let compiled = |text: &Text, variables: &[Variable<'_>]| {
                     let wanted = (one.unit.dimension, one.name.as_str());
-                    Formula::compile((&text.text, text.at), Known { variables, ..known }, wanted)
+                    Formula::compile((&text.text, text.at), SymbolTable { variables, ..symbols }, wanted)
                         .map_err(|wrong| self.source.wrong_from(wrong.at, &wrong.why))
                 };
                 let formulas = (compiled(&one.start, &before)?, compiled(&one.update, &while_kept)?);
