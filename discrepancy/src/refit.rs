@@ -333,7 +333,7 @@ pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, options: Options) -
     let (fit, outer) =
         Estimator::new(options).descend(model, |_, best| match linearised_anew(engine, best) {
             Err(()) => Step::Impossible,
-            Ok(Some(next)) => Step::Taken(next),
+            Ok(Some(next)) => Step::Accepted(next),
             Ok(None) => Step::Refused { predicted_reduction: 0.0 },
         });
     if outer.outcome == Outcome::StepLimit {

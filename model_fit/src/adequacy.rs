@@ -12,7 +12,7 @@
 //!
 //! Source: von Neumann 1941, Annals of Mathematical Statistics 12(4).
 
-use super::fit::{Fitting, OfRecord};
+use super::fit::{Fitting, OutputSeries};
 use super::report::{ModelReport, significant};
 use super::select::Fitted;
 use crate::Verdict;
@@ -70,7 +70,7 @@ pub(super) fn residuals(fitted: &Fitted<'_>) -> Result<Vec<Residual>, Failure> {
     Ok((0..fitting.model.outputs.len()).map(|output| residual(fitting, &left, output)).collect())
 }
 
-fn residual(fitting: &Fitting<'_>, left: &[OfRecord], output: usize) -> Residual {
+fn residual(fitting: &Fitting<'_>, left: &[OutputSeries], output: usize) -> Residual {
     let of_model = &fitting.model.outputs[output];
     let every = fitting.model.rows.every;
     let (mut differences, mut measured, mut squares) = (Vec::new(), Vec::new(), 0.0);

@@ -63,17 +63,17 @@ pub fn new_model(record: &Path, roles: Roles<'_>) -> Result<NewModel, NewError> 
     let bytes = std::fs::read(record).map_err(|why| NewError::Open { file: record.to_owned(), why })?;
     let table = Table::of(record, &String::from_utf8_lossy(&bytes))?;
     let (time, columns) = guess::columns(record, &table, roles)?;
-    let text = Text { table: &table, time: &time, columns: &columns };
+    let text = ModelText { table: &table, time: &time, columns: &columns };
     Ok(NewModel { text: text.written(record), has_input: text.of(Role::Input).next().is_some() })
 }
 
-struct Text<'a> {
+struct ModelText<'a> {
     table: &'a Table,
-    time: &'a guess::Time,
+    time: &'a guess::TimeColumn,
     columns: &'a [Column],
 }
 
-impl Text<'_> {
+impl ModelText<'_> {
     fn of(&self, role: Role) -> impl Iterator<Item = &Column> {
         self.columns.iter().filter(move |column| column.role == role)
     }

@@ -1,6 +1,6 @@
 //! Numbers that ended at the end of their range, and numbers that the records hardly determine.
 
-use super::report::{ModelReport, Number, significant};
+use super::report::{ModelReport, ParameterEstimate, significant};
 
 /// How near to an end of its range a number counts as at it: this share of the end, and of the range.
 const NEAR: f64 = 1e-4;
@@ -20,14 +20,14 @@ pub(super) fn is_at_bound(value_si: f64, range_si: [f64; 2]) -> bool {
 }
 
 /// A number with the term that it belongs to.
-fn name(number: &Number) -> String {
+fn name(number: &ParameterEstimate) -> String {
     number.suspect.as_ref().map_or(number.name.clone(), |suspect| format!("{} of {suspect}", number.name))
 }
 
 /// Of numbers that are fitted: which ended at an end of its range, which are hardly determined, and which are far from what the
 /// file expects.
-pub(super) fn remarks(numbers: &[Number]) -> Vec<String> {
-    let remark = |number: &Number| {
+pub(super) fn remarks(numbers: &[ParameterEstimate]) -> Vec<String> {
+    let remark = |number: &ParameterEstimate| {
         let value = format!("{} {}", significant(number.value), number.unit);
         if number.is_at_bound {
             return Some(format!(
@@ -49,7 +49,7 @@ pub(super) fn remarks(numbers: &[Number]) -> Vec<String> {
 }
 
 /// A number that is many tolerances from its value in the file.
-fn unexpected(number: &Number) -> Option<String> {
+fn unexpected(number: &ParameterEstimate) -> Option<String> {
     let [value, tolerance] = number.expected?;
     let away = (number.value - value).abs() / tolerance;
     (away > UNEXPECTED).then(|| {
@@ -68,7 +68,7 @@ fn unexpected(number: &Number) -> Option<String> {
 impl ModelReport {
     /// Held-out records of which the reported model leaves much more than of the training records: each with the ratio.
     pub(super) fn much_worse(&self) -> Vec<String> {
-        let of = |left: &super::Left| {
+        let of = |left: &super::ResidualComparison| {
             let fitted = self.training.iter().find(|fitted| fitted.output == left.output)?;
             let ratio = left.rms_after / fitted.rms_after;
             (fitted.rms_after > 0.0 && ratio > MUCH_WORSE).then(|| {

@@ -6,26 +6,26 @@
 //! Source: Roberts et al. 2017, Ecography 40(8) (blocked folds).
 
 use super::fit::Fitting;
-use super::record::Measured;
+use super::record::MeasuredRecord;
 
 /// Blocks of time of each record.
 const BLOCKS: usize = 10;
 /// Bands of what folds go over beside the time.
 const BANDS: usize = 5;
 
-/// Rows of all records in blocks; those of the last block judge nothing.
+/// Partition of the rows of all records into blocks; rows of the last block are not judged.
 #[derive(Clone, Debug)]
-pub(crate) struct Cut {
+pub(crate) struct BlockPartition {
     pub(crate) blocks: usize,
-    /// Of each record and row.
+    /// Block of each record and row.
     pub(super) block_of: Vec<Vec<usize>>,
 }
 
 impl Fitting<'_> {
     /// Each record in blocks of time.
-    pub(crate) fn in_time(&self) -> Cut {
+    pub(crate) fn blocks_in_time(&self) -> BlockPartition {
         let blocks = BLOCKS * self.records.len();
-        let of_record = |(record, measured): (usize, &Measured)| {
+        let of_record = |(record, measured): (usize, &MeasuredRecord)| {
             let rows = self.rows(record);
             let block = |row: usize| match measured.is_judged[row] && rows.contains(&row) {
                 true => record * BLOCKS + (row - rows.start) * BLOCKS / rows.len(),
@@ -33,11 +33,11 @@ impl Fitting<'_> {
             };
             (0..measured.time_s.len()).map(block).collect()
         };
-        Cut { blocks, block_of: self.records.iter().enumerate().map(of_record).collect() }
+        BlockPartition { blocks, block_of: self.records.iter().enumerate().map(of_record).collect() }
     }
 
     /// Bands of what folds go over, by its number in the model, each with as many rows of all records.
-    pub(crate) fn in_bands(&self, fold: usize) -> Cut {
+    pub(crate) fn blocks_in_bands(&self, fold: usize) -> BlockPartition {
         let places = self.records.iter().enumerate();
         let mut order: Vec<(f64, usize, usize)> = places
             .flat_map(|(record, measured)| {
@@ -51,6 +51,6 @@ impl Fitting<'_> {
         for (place, (_, record, row)) in order.iter().enumerate() {
             block_of[*record][*row] = place * BANDS / order.len();
         }
-        Cut { blocks: BANDS, block_of }
+        BlockPartition { blocks: BANDS, block_of }
     }
 }

@@ -21,10 +21,10 @@ mod features;
 mod place;
 mod screen;
 
-use super::fit::{Fitting, OPTIONS, Unknown, What};
+use super::fit::{Fitting, OPTIONS, Unknown, UnknownKind};
 use super::judge::{Evaluation, GAIN_APART, judge};
-use super::record::Measured;
-use super::select::{Fitted, Found, MOST_TERMS, SAME, fitted, fitted_from};
+use super::record::MeasuredRecord;
+use super::select::{Fitted, MOST_TERMS, SAME, SearchResult, fitted, fitted_from};
 pub use described::DiscoveredTerm;
 use features::{Term, terms, variables};
 use model::{Failure, Model};
@@ -43,7 +43,7 @@ const SAME_RESPONSE: f64 = 0.98;
 const STABLE: f64 = 0.6;
 
 /// A model with all terms of a search as further suspects.
-pub(super) struct Grown {
+pub(super) struct ModelWithTerms {
     model: Model,
     terms: Vec<Term>,
     /// Index of the first of them.
@@ -62,18 +62,18 @@ pub(super) struct Discovered {
     pub(super) text: String,
 }
 
-/// What came of a search.
+/// Result of a search for terms.
 pub(super) struct Discovery<'a> {
-    pub(super) found: Found<'a>,
+    pub(super) found: SearchResult<'a>,
     pub(super) terms: Vec<Discovered>,
     pub(super) note: String,
 }
 
 /// The model with the terms of a search; the reason where there is none.
-pub(super) fn grown(baseline: &Fitted<'_>) -> Result<Grown, String> {
+pub(super) fn with_terms(baseline: &Fitted<'_>) -> Result<ModelWithTerms, String> {
     let model = baseline.fitting.model;
     let records = baseline.fitting.records;
-    let length = |record: &Measured| record.sampled_s[record.sampled_s.len() - 1] - record.sampled_s[0];
+    let length = |record: &MeasuredRecord| record.sampled_s[record.sampled_s.len() - 1] - record.sampled_s[0];
     let length_s = records.iter().map(length).fold(f64::INFINITY, f64::min);
     let period_s = records.iter().map(|record| length(record) / (record.sampled_s.len() - 1) as f64);
     let period_s = period_s.fold(f64::INFINITY, f64::min);
@@ -83,32 +83,32 @@ pub(super) fn grown(baseline: &Fitted<'_>) -> Result<Grown, String> {
     }
     let text: String = terms.iter().map(|term| term.text.as_str()).collect();
     let text = format!("{}\n{text}", model.text);
-    let mut grown = Model::parse(&text, Path::new("model with the terms of the search"))
+    let mut with_terms = Model::parse(&text, Path::new("model with the terms of the search"))
         .map_err(|error| error.to_string())?;
-    grown.starts = 0;
-    grown.name.clone_from(&model.name);
-    Ok(Grown { first: model.suspects.len(), model: grown, terms, left_out })
+    with_terms.starts = 0;
+    with_terms.name.clone_from(&model.name);
+    Ok(ModelWithTerms { first: model.suspects.len(), model: with_terms, terms, left_out })
 }
 
 /// Searches beside a model of which no suspect was named.
 pub(super) fn search<'a>(
-    grown: &'a Grown,
-    records: &'a [Measured],
-    found: Found<'a>,
+    with_terms: &'a ModelWithTerms,
+    records: &'a [MeasuredRecord],
+    found: SearchResult<'a>,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Discovery<'a>, Failure> {
-    let Grown { model, terms, first, left_out } = grown;
+    let ModelWithTerms { model, terms, first, left_out } = with_terms;
     let baseline = fitted(model, records, &[], Some(&found.baseline))?;
-    let mut found = Found { extended: baseline.clone(), baseline, ..found };
+    let mut found = SearchResult { extended: baseline.clone(), baseline, ..found };
     let rows: usize = records.iter().map(|record| record.time_s.len()).sum();
     let fitted_terms = (ROWS / rows.max(1)).clamp(FITTED[0], FITTED[1]);
-    let mut taken: Vec<Discovered> = Vec::new();
+    let mut accepted: Vec<Discovered> = Vec::new();
     let mut why = String::new();
-    while taken.len() < MOST_TERMS {
-        progress(&format!("search: term {} among {}", taken.len() + 1, terms.len()));
+    while accepted.len() < MOST_TERMS {
+        progress(&format!("search: term {} among {}", accepted.len() + 1, terms.len()));
         let Some(screen) = Screen::new(&found.extended, *first, terms.len()) else { break };
         let best = screen.best(fitted_terms, SAME_RESPONSE, |term| terms[term].complexity);
-        let Some(round) = round(grown, &found, &screen, &best) else { break };
+        let Some(round) = round(with_terms, &found, &screen, &best) else { break };
         let (fit, evaluation, alternatives) = round;
         let term = evaluation.suspect - first;
         let stability = screen.stability(term);
@@ -123,20 +123,20 @@ pub(super) fn search<'a>(
         found.extended = fit;
         let Term { variables, text, .. } = &terms[term];
         let (variables, text) = (variables.clone(), text.clone());
-        taken.push(Discovered { evaluation, variables, stability, alternatives, text });
+        accepted.push(Discovered { evaluation, variables, stability, alternatives, text });
     }
     let cut = if *left_out > 0 { format!(", {left_out} longer ones left out") } else { String::new() };
-    let note = format!("searched {} terms{cut}, {} taken{why}", terms.len(), taken.len());
-    Ok(Discovery { found, terms: taken, note })
+    let note = format!("searched {} terms{cut}, {} taken{why}", terms.len(), accepted.len());
+    Ok(Discovery { found, terms: accepted, note })
 }
 
 /// Where the fit of a model with more terms begins: at what the smaller one gave, and at the coefficients of the linear
 /// screening, by their parameters.
 fn start(fitting: &Fitting<'_>, before: &Fitted<'_>, screened_si: impl Fn(usize) -> Option<f64>) -> Vec<f64> {
-    let known = |what: What| before.fitting.unknowns.iter().position(|unknown| unknown.what == what);
-    let value = |unknown: &Unknown| match (unknown.what, known(unknown.what)) {
+    let known = |kind: UnknownKind| before.fitting.unknowns.iter().position(|unknown| unknown.kind == kind);
+    let value = |unknown: &Unknown| match (unknown.kind, known(unknown.kind)) {
         (_, Some(place)) => before.point.values_si[place],
-        (What::Shared(index), None) => screened_si(index).unwrap_or(unknown.start_si),
+        (UnknownKind::Shared(index), None) => screened_si(index).unwrap_or(unknown.start_si),
         _ => unknown.start_si,
     };
     fitting.unknowns.iter().map(value).collect()
@@ -144,12 +144,12 @@ fn start(fitting: &Fitting<'_>, before: &Fitted<'_>, screened_si: impl Fn(usize)
 
 /// The best of the terms fitted in the simulator, and others that are as good.
 fn round<'a>(
-    grown: &'a Grown,
-    found: &Found<'a>,
+    with_terms: &'a ModelWithTerms,
+    found: &SearchResult<'a>,
     screen: &Screen,
     best: &[usize],
 ) -> Option<(Fitted<'a>, Evaluation, Vec<usize>)> {
-    let Grown { model, terms, first, .. } = grown;
+    let ModelWithTerms { model, terms, first, .. } = with_terms;
     let before = &found.extended;
     let fit = |term: &usize| {
         let suspect = first + term;
@@ -166,7 +166,7 @@ fn round<'a>(
     let effective = least.1.effective.clone();
     let judged: Vec<Evaluation> = fits
         .iter()
-        .map(|(suspect, fit)| judge(found.sides(), fit, *suspect, (terms.len(), &effective)))
+        .map(|(suspect, fit)| judge(found.reference_fits(), fit, *suspect, (terms.len(), &effective)))
         .collect();
     let most = judged.iter().map(Evaluation::worth).fold(f64::NEG_INFINITY, f64::max);
     // Of those that are as good the simplest.

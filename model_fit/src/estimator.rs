@@ -74,7 +74,7 @@ pub trait Iterate {
 /// A step that was searched for.
 pub enum Step<P> {
     /// The first fraction whose loss is below that of the iterate before.
-    Taken(P),
+    Accepted(P),
     /// No fraction lowers the loss, though the linearised model predicts this reduction.
     Refused { predicted_reduction: f64 },
     /// No linearisation: a neighbouring rig does not exist.
@@ -111,7 +111,7 @@ impl Estimator {
             if let Some(tried) = at(*fraction)
                 && tried.loss() < from.loss()
             {
-                return Step::Taken(tried);
+                return Step::Accepted(tried);
             }
         }
         Step::Refused { predicted_reduction }
@@ -137,7 +137,7 @@ impl Estimator {
         let (mut outcome, mut iterations) = (Outcome::StepLimit, 0);
         while iterations < self.options.steps {
             let next = match step(&mut self, &point) {
-                Step::Taken(next) => next,
+                Step::Accepted(next) => next,
                 Step::Refused { predicted_reduction }
                     if predicted_reduction <= self.tolerance(point.loss()) =>
                 {
@@ -169,11 +169,11 @@ impl Estimator {
 mod tests {
     use super::*;
 
-    /// A number with a loss of it, within 0 to 10.
+    /// An iterate of one number, within 0 to 10, and its loss.
     #[derive(Clone, Copy, Debug)]
-    struct At(f64, fn(f64) -> f64);
+    struct ScalarIterate(f64, fn(f64) -> f64);
 
-    impl Iterate for At {
+    impl Iterate for ScalarIterate {
         fn loss(&self) -> f64 {
             self.1(self.0)
         }
@@ -187,12 +187,17 @@ mod tests {
         Options { steps: 20, converged: 1e-6, converged_share: 0.0, fractions: &[1.0, 0.5, 0.25] };
 
     /// Newton's method with a slope and a curvature that belong to the loss, or do not.
-    fn fitted(loss: fn(f64) -> f64, start: f64, slope: fn(f64) -> f64, curvature: f64) -> (At, Convergence) {
-        Estimator::new(OPTIONS).descend(At(start, loss), |estimator, at| {
+    fn fitted(
+        loss: fn(f64) -> f64,
+        start: f64,
+        slope: fn(f64) -> f64,
+        curvature: f64,
+    ) -> (ScalarIterate, Convergence) {
+        Estimator::new(OPTIONS).descend(ScalarIterate(start, loss), |estimator, at| {
             let step = -slope(at.0) / curvature;
             let predicted_reduction = 0.5 * slope(at.0) * slope(at.0) / curvature;
             estimator.backtrack(at, predicted_reduction, OPTIONS.fractions, |fraction| {
-                Some(At((at.0 + fraction * step).clamp(0.0, 10.0), loss))
+                Some(ScalarIterate((at.0 + fraction * step).clamp(0.0, 10.0), loss))
             })
         })
     }
@@ -230,10 +235,10 @@ mod tests {
         let from = |start: f64, converged_share: f64| {
             let loss = |x: f64| 1000.0 + (x - 3.0).powi(2);
             let options = Options { converged_share, ..OPTIONS };
-            let halfway = |estimator: &mut Estimator, at: &At| {
-                estimator.backtrack(at, 1.0, &[1.0], |_| Some(At(3.0 + 0.5 * (at.0 - 3.0), loss)))
+            let halfway = |estimator: &mut Estimator, at: &ScalarIterate| {
+                estimator.backtrack(at, 1.0, &[1.0], |_| Some(ScalarIterate(3.0 + 0.5 * (at.0 - 3.0), loss)))
             };
-            Estimator::new(options).descend(At(start, loss), halfway).1
+            Estimator::new(options).descend(ScalarIterate(start, loss), halfway).1
         };
         assert_eq!((from(4.0, 1e-3).iterations, from(9.0, 1e-3).iterations), (1, 4));
         assert!(from(4.0, 0.0).iterations > 5);

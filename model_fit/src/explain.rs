@@ -4,14 +4,15 @@ use super::bounds;
 use super::explain_page::page;
 use super::report::{friction, notes_of, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
-use super::{ModelError, look, looked_at, read, select};
+use super::{ModelError, look, read, read_with_notes, select};
 use model::{
     Hold, Input, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start, Suspect, Table,
 };
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-pub struct Explained {
+/// A model file in words.
+pub struct Explanation {
     pub text: String,
     /// As a page, its equations set.
     pub page: String,
@@ -29,14 +30,14 @@ pub fn explain(file: &Path, train: &[PathBuf]) -> Result<String, ModelError> {
 ///
 /// # Errors
 /// Those of [`explain`].
-pub fn explained(file: &Path, train: &[PathBuf]) -> Result<Explained, ModelError> {
+pub fn explained(file: &Path, train: &[PathBuf]) -> Result<Explanation, ModelError> {
     let model = read(file)?;
     let mut text = in_words(&model);
     if train.is_empty() {
         let page = page(&model, &[], &text);
-        return Ok(Explained { text, page });
+        return Ok(Explanation { text, page });
     }
-    let records = looked_at(&model, train)?;
+    let records = read_with_notes(&model, train)?;
     let baseline = select::fitted(&model, &records, &[], None)?;
     let weak = bounds::remarks(&numbers(&baseline, &baseline, false));
     let notes: Vec<String> = look::beyond_reach(&baseline).into_iter().chain(notes_of(&records)).collect();
@@ -46,7 +47,7 @@ pub fn explained(file: &Path, train: &[PathBuf]) -> Result<Explained, ModelError
     let told = structure_in_words(&structure(&baseline, &baseline), weak);
     let _ = write!(text, "\nwhat these records can tell apart\n  {}\n", told.join("\n  "));
     let page = page(&model, &told, &text);
-    Ok(Explained { text, page })
+    Ok(Explanation { text, page })
 }
 
 pub(crate) fn in_words(model: &Model) -> String {

@@ -5,8 +5,8 @@
 
 use super::declared::declared;
 use super::discover::DiscoveredTerm;
-use super::report::{ModelReport, Named, SCHEMA_VERSION, equations};
-use model::{Found, Library, Model};
+use super::report::{ModelReport, NamedSuspect, SCHEMA_VERSION, equations};
+use model::{Library, LibrarySuspect, Model};
 use std::path::Path;
 use toml_edit::{ArrayOfTables, DocumentMut, InlineTable, Item, Table, TableLike, value};
 
@@ -78,7 +78,7 @@ pub fn extended(text: &str, folder: &Path, report: &ModelReport) -> Result<Strin
         let name = name_of(term, folder);
         put(term, report, (name.as_deref(), folder));
     }
-    for Named { suspect, .. } in &report.named {
+    for NamedSuspect { suspect, .. } in &report.named {
         let suspects = document.get_mut("suspects").and_then(Item::as_array_of_tables_mut);
         let suspects = suspects.ok_or_else(|| ExtendError::Unknown { name: suspect.clone() })?;
         let is_it = |table: &Table| name_of(table, folder).as_ref() == Some(suspect);
@@ -109,7 +109,7 @@ fn push(document: &mut DocumentMut, term: Table) -> Result<(), ExtendError> {
     Ok(())
 }
 
-fn library_of(table: &dyn TableLike, folder: &Path) -> Option<Found> {
+fn library_of(table: &dyn TableLike, folder: &Path) -> Option<LibrarySuspect> {
     table.get("use").and_then(Item::as_str).and_then(|used| Library::find(used, folder).ok())
 }
 
@@ -168,7 +168,7 @@ fn put(table: &mut dyn TableLike, report: &ModelReport, (suspect, folder): (Opti
 
 #[cfg(test)]
 mod tests {
-    use super::super::report::Number;
+    use super::super::report::ParameterEstimate;
     use super::*;
 
     const MODEL: &str = r#"
@@ -194,7 +194,12 @@ name = "offset"
     impl ModelReport {
         fn with(mut self, name: &str, value: f64) -> Self {
             let suspect = Some("drag".to_owned());
-            self.parameters.push(Number { name: name.into(), suspect, value, ..Number::default() });
+            self.parameters.push(ParameterEstimate {
+                name: name.into(),
+                suspect,
+                value,
+                ..ParameterEstimate::default()
+            });
             self
         }
     }

@@ -10,9 +10,9 @@
 //!
 //! Sources: Ljung, System Identification, 2nd edition, 7.2 (output error), 15.3 (concentrated likelihood); Björck 1996, 9.
 
-use super::cuts::Cut;
+use super::cuts::BlockPartition;
 use super::normal::{Normal, solved};
-use super::record::Measured;
+use super::record::MeasuredRecord;
 use crate::estimator::{Convergence, Estimator, Iterate, Options, Step};
 use model::{Direction, Failure, Inputs, Model, Parameter, Program, Simulator, Start, Unit};
 use nalgebra::{DMatrix, DVector};
@@ -40,12 +40,13 @@ const FASTEST: f64 = 0.25;
 const STEPS_OF_START: usize = 10;
 const STEPS_OF_SAMPLE: usize = 30;
 
+/// What a fitted number is: indices of parameter or state, then of the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum What {
+pub(crate) enum UnknownKind {
     /// A parameter, of all records.
     Shared(usize),
     /// A parameter of one record.
-    OfRecord(usize, usize),
+    PerRecord(usize, usize),
     /// The start of a state in one record.
     Start(usize, usize),
 }
@@ -53,7 +54,7 @@ pub(crate) enum What {
 /// A number that is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unknown {
-    pub(crate) what: What,
+    pub(crate) kind: UnknownKind,
     pub(crate) start_si: f64,
     pub(crate) range_si: [f64; 2],
     /// What is known of it: value and standard deviation.
@@ -65,7 +66,7 @@ pub(crate) struct Unknown {
 pub(crate) struct Fitting<'a> {
     pub(crate) model: &'a Model,
     pub(crate) program: Program,
-    pub(crate) records: &'a [Measured],
+    pub(crate) records: &'a [MeasuredRecord],
     pub(crate) unknowns: Vec<Unknown>,
     /// Rows of each record that count.
     in_score: Vec<std::ops::Range<usize>>,
@@ -79,8 +80,8 @@ pub(crate) struct Fitting<'a> {
     most_steps: usize,
 }
 
-/// Of each output of a record what is left, and what the model says.
-pub(crate) type OfRecord = Vec<[Vec<f64>; 2]>;
+/// Residuals and predictions of each output of a record.
+pub(crate) type OutputSeries = Vec<[Vec<f64>; 2]>;
 
 #[derive(Clone, Debug)]
 pub(crate) struct Point {
@@ -104,8 +105,8 @@ impl Iterate for Point {
 }
 
 /// Least time constant that samples show, s. A shorter one changes nothing that is measured, and makes the equations stiff.
-fn fastest_s(records: &[Measured]) -> f64 {
-    let period_s = |record: &Measured| {
+fn fastest_s(records: &[MeasuredRecord]) -> f64 {
+    let period_s = |record: &MeasuredRecord| {
         let length_s = record.sampled_s[record.sampled_s.len() - 1] - record.sampled_s[0];
         length_s / (record.sampled_s.len() - 1) as f64
     };
@@ -113,7 +114,7 @@ fn fastest_s(records: &[Measured]) -> f64 {
 }
 
 /// Values of all parameters before a fit, with those that are known of a record.
-fn known(model: &Model, record: &Measured) -> Vec<f64> {
+fn known(model: &Model, record: &MeasuredRecord) -> Vec<f64> {
     // Reading a record refuses one that is not listed.
     let known = |one: &Parameter| one.known_si(&record.file).unwrap_or(one.values_si[0]);
     model.parameters.iter().map(known).collect()
@@ -124,7 +125,7 @@ impl<'a> Fitting<'a> {
     pub(crate) fn new(
         model: &'a Model,
         program: Program,
-        records: &'a [Measured],
+        records: &'a [MeasuredRecord],
         suspects: &[usize],
     ) -> Self {
         let mut unknowns = Vec::new();
@@ -134,22 +135,23 @@ impl<'a> Fitting<'a> {
             if parameter.is_bound_by_samples {
                 range_si[0] = range_si[0].max(fastest_s(records)).min(range_si[1]);
             }
-            let unknown = |what| Unknown {
-                what,
+            let unknown = |kind| Unknown {
+                kind,
                 start_si: parameter.values_si[0].clamp(range_si[0], range_si[1]),
                 range_si,
                 prior_si: parameter.tolerance_si.map(|tolerance| [parameter.values_si[0], tolerance]),
             };
             if parameter.is_per_record {
-                unknowns.extend((0..records.len()).map(|record| unknown(What::OfRecord(index, record))));
+                unknowns
+                    .extend((0..records.len()).map(|record| unknown(UnknownKind::PerRecord(index, record))));
             } else {
-                unknowns.push(unknown(What::Shared(index)));
+                unknowns.push(unknown(UnknownKind::Shared(index)));
             }
         }
         for state in program.states() {
             if let Start::Fitted { guess_si, range_si } = model.states[*state].start {
                 let unknown = |record| Unknown {
-                    what: What::Start(*state, record),
+                    kind: UnknownKind::Start(*state, record),
                     start_si: guess_si,
                     range_si,
                     prior_si: None,
@@ -157,7 +159,7 @@ impl<'a> Fitting<'a> {
                 unknowns.extend((0..records.len()).map(unknown));
             }
         }
-        let first = |record: &Measured, start: Start| match start {
+        let first = |record: &MeasuredRecord, start: Start| match start {
             Start::Known { value_si } | Start::Fitted { guess_si: value_si, .. } => value_si,
             Start::Record { output } => {
                 record.outputs[output].iter().flatten().next().copied().unwrap_or(0.0)
@@ -193,17 +195,17 @@ impl<'a> Fitting<'a> {
     pub(crate) fn frozen(
         fitted: &Fitting<'a>,
         point: &Point,
-        records: &'a [Measured],
+        records: &'a [MeasuredRecord],
         suspects: &[usize],
         rows: usize,
     ) -> Self {
         let mut other = Self::new(fitted.model, fitted.program.clone(), records, suspects);
         for (unknown, value) in fitted.unknowns.iter().zip(&point.values_si) {
-            if let What::Shared(index) = unknown.what {
+            if let UnknownKind::Shared(index) = unknown.kind {
                 other.parameters_si.iter_mut().for_each(|parameters| parameters[index] = *value);
             }
         }
-        other.unknowns.retain(|unknown| !matches!(unknown.what, What::Shared(_)));
+        other.unknowns.retain(|unknown| !matches!(unknown.kind, UnknownKind::Shared(_)));
         for (range, record) in other.in_score.iter_mut().zip(records) {
             *range = 0..rows.min(record.time_s.len());
         }
@@ -222,7 +224,7 @@ impl<'a> Fitting<'a> {
 
     /// Measured samples of an output that count.
     pub(crate) fn count(&self, output: usize) -> f64 {
-        let measured = |(record, rows): (&Measured, &std::ops::Range<usize>)| {
+        let measured = |(record, rows): (&MeasuredRecord, &std::ops::Range<usize>)| {
             record.outputs[output][rows.clone()].iter().flatten().count()
         };
         self.records.iter().zip(&self.in_score).map(measured).sum::<usize>() as f64
@@ -265,12 +267,12 @@ impl<'a> Fitting<'a> {
         let mut directions = Vec::new();
         for place in self.of_record(record) {
             let value = values_si[place];
-            directions.push(match self.unknowns[place].what {
-                What::Shared(index) | What::OfRecord(index, _) => {
+            directions.push(match self.unknowns[place].kind {
+                UnknownKind::Shared(index) | UnknownKind::PerRecord(index, _) => {
                     parameters[index] = value;
                     Direction::Parameter(index)
                 }
-                What::Start(state, _) => {
+                UnknownKind::Start(state, _) => {
                     starts[state] = value;
                     Direction::Start(state)
                 }
@@ -338,9 +340,9 @@ impl<'a> Fitting<'a> {
 
     /// Unknowns that a record is simulated with, in the order of its directions.
     pub(super) fn of_record(&self, record: usize) -> Vec<usize> {
-        let is_mine = |place: &usize| match self.unknowns[*place].what {
-            What::Shared(_) => true,
-            What::OfRecord(_, of) | What::Start(_, of) => of == record,
+        let is_mine = |place: &usize| match self.unknowns[*place].kind {
+            UnknownKind::Shared(_) => true,
+            UnknownKind::PerRecord(_, of) | UnknownKind::Start(_, of) => of == record,
         };
         (0..self.unknowns.len()).filter(is_mine).collect()
     }
@@ -348,31 +350,43 @@ impl<'a> Fitting<'a> {
     /// What people call a number.
     pub(crate) fn name_of(&self, unknown: &Unknown) -> String {
         let record = |record: usize| &self.records[record].name;
-        match unknown.what {
-            What::Shared(index) => self.model.parameters[index].name.clone(),
-            What::OfRecord(index, of) => format!("{} of {}", self.model.parameters[index].name, record(of)),
-            What::Start(state, of) => format!("start of {} in {}", self.model.states[state].name, record(of)),
+        match unknown.kind {
+            UnknownKind::Shared(index) => self.model.parameters[index].name.clone(),
+            UnknownKind::PerRecord(index, of) => {
+                format!("{} of {}", self.model.parameters[index].name, record(of))
+            }
+            UnknownKind::Start(state, of) => {
+                format!("start of {} in {}", self.model.states[state].name, record(of))
+            }
         }
     }
 
     /// The term or suspect that it belongs to.
     pub(crate) fn suspect_of(&self, unknown: &Unknown) -> Option<usize> {
-        match unknown.what {
-            What::Shared(index) | What::OfRecord(index, _) => self.model.parameters[index].suspect,
-            What::Start(state, _) => self.model.states[state].suspect,
+        match unknown.kind {
+            UnknownKind::Shared(index) | UnknownKind::PerRecord(index, _) => {
+                self.model.parameters[index].suspect
+            }
+            UnknownKind::Start(state, _) => self.model.states[state].suspect,
         }
     }
 
     /// Unit in which the model file writes an unknown.
     pub(crate) fn unit_of(&self, unknown: &Unknown) -> &'a Unit {
-        match unknown.what {
-            What::Shared(index) | What::OfRecord(index, _) => &self.model.parameters[index].unit,
-            What::Start(state, _) => &self.model.states[state].unit,
+        match unknown.kind {
+            UnknownKind::Shared(index) | UnknownKind::PerRecord(index, _) => {
+                &self.model.parameters[index].unit
+            }
+            UnknownKind::Start(state, _) => &self.model.states[state].unit,
         }
     }
 
     /// Normal equations of each block of a cut and output; the last are those of rows that judge nothing.
-    pub(crate) fn normals(&self, values_si: &[f64], cut: &Cut) -> Result<Vec<Vec<Normal>>, Failure> {
+    pub(crate) fn normals(
+        &self,
+        values_si: &[f64],
+        cut: &BlockPartition,
+    ) -> Result<Vec<Vec<Normal>>, Failure> {
         let count = self.model.outputs.len();
         let mut blocks = vec![vec![Normal::zero(self.unknowns.len()); count]; cut.blocks + 1];
         for record in 0..self.records.len() {
@@ -430,13 +444,13 @@ impl<'a> Fitting<'a> {
         let samples: f64 = (0..self.model.outputs.len()).map(|output| self.count(output)).sum();
         let converged = OPTIONS.converged + CONVERGED_PER_SAMPLE * samples;
         let options = Options { steps, converged, ..OPTIONS };
-        let cut = self.in_time();
+        let cut = self.blocks_in_time();
         Ok(Estimator::new(options).descend(start, |estimator, point| {
             let Ok(normals) = here.normals(&point.values_si, &cut) else { return Step::Impossible };
             let sum = here.sum(&normals, point);
             let predicted_reduction = sum.slope.dot(&here.step(&sum, &point.values_si, 0.0));
             match here.best_step(estimator, point, &sum, predicted_reduction) {
-                Some(best) => Step::Taken(best),
+                Some(best) => Step::Accepted(best),
                 None => Step::Refused { predicted_reduction },
             }
         }))

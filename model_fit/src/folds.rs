@@ -10,9 +10,9 @@
 //! A start belongs to its record, as on a held-out record, where it is fitted, too: without the first block nothing else would
 //! determine it, and the fold would ask what the model never claims.
 
-use super::fit::{Fitting, Point, What};
+use super::fit::{Fitting, Point, UnknownKind};
 use super::normal::{Normal, solved};
-use super::record::Measured;
+use super::record::MeasuredRecord;
 use super::select::Fitted;
 use crate::stats::mean;
 use nalgebra::DVector;
@@ -29,7 +29,7 @@ pub(super) fn steps(
     point: &Point,
 ) -> Vec<DVector<f64>> {
     let is_own: Vec<bool> =
-        fitting.unknowns.iter().map(|unknown| !matches!(unknown.what, What::Shared(_))).collect();
+        fitting.unknowns.iter().map(|unknown| !matches!(unknown.kind, UnknownKind::Shared(_))).collect();
     let without = |block: &Vec<Normal>| {
         let mut rest = all.clone();
         for (output, normal) in block.iter().enumerate() {
@@ -93,9 +93,9 @@ const STEPS: usize = 10;
 /// The same by fits without each block, in place of linear steps; `None` where one cannot be simulated.
 pub(super) fn refitted(fitted: &Fitted<'_>) -> Option<Folds> {
     let (fitting, point) = (&fitted.fitting, &fitted.point);
-    let cut = fitting.in_time();
+    let cut = fitting.blocks_in_time();
     let without = |block: usize| -> Option<Vec<f64>> {
-        let mut rest: Vec<Measured> = fitting.records.to_vec();
+        let mut rest: Vec<MeasuredRecord> = fitting.records.to_vec();
         for (record, blocks) in rest.iter_mut().zip(&cut.block_of) {
             for (row, _) in blocks.iter().enumerate().filter(|(_, of)| **of == block) {
                 record.outputs.iter_mut().for_each(|output| output[row] = None);
@@ -108,7 +108,7 @@ pub(super) fn refitted(fitted: &Fitted<'_>) -> Option<Folds> {
         let rows = fitting.records.iter().map(|record| record.time_s.len()).max()?;
         let of_records = Fitting::frozen(fitting, &end, fitting.records, &fitted.suspects, rows);
         let start = fitting.unknowns.iter().zip(&end.values_si);
-        let start = start.filter(|(unknown, _)| !matches!(unknown.what, What::Shared(_)));
+        let start = start.filter(|(unknown, _)| !matches!(unknown.kind, UnknownKind::Shared(_)));
         let (refitted, _) = of_records.fit(start.map(|(_, value)| *value).collect(), STEPS).ok()?;
         let residuals = of_records.residuals(&refitted.values_si).ok()?;
         let squares = |output: usize| {

@@ -1,9 +1,9 @@
 //! Both models on records that were not used: shared numbers frozen, the record's own fitted on its first samples, which are not
 //! scored.
 
-use super::fit::{Fitting, OPTIONS, OfRecord, What};
-use super::record::Measured;
-use super::select::{Fitted, Found, Rival};
+use super::fit::{Fitting, OPTIONS, OutputSeries, UnknownKind};
+use super::record::MeasuredRecord;
+use super::select::{Fitted, Rival, SearchResult};
 use super::starts;
 use model::{Failure, Model, Program};
 
@@ -12,7 +12,7 @@ pub const WORSE: f64 = 1.02;
 
 /// What is left of an output on a record by both models, the baseline's first.
 #[derive(Clone, Debug)]
-pub(crate) struct Judged {
+pub(crate) struct HeldOutResidual {
     pub(crate) record: usize,
     pub(crate) output: usize,
     pub(crate) rms_si: [f64; 2],
@@ -45,12 +45,12 @@ pub enum JudgeError {
 }
 
 /// Whether records have enough samples for the numbers that the model itself has of each record, before anything is fitted.
-pub(crate) fn check(model: &Model, records: &[Measured]) -> Result<(), JudgeError> {
+pub(crate) fn check(model: &Model, records: &[MeasuredRecord]) -> Result<(), JudgeError> {
     let program = Program::new(model, &[]).expect("it was compiled when the file was read");
     for record in records {
         let one = std::slice::from_ref(record);
         let fitting = Fitting::new(model, program.clone(), one, &[]);
-        if fitting.unknowns.iter().any(|unknown| !matches!(unknown.what, What::Shared(_))) {
+        if fitting.unknowns.iter().any(|unknown| !matches!(unknown.kind, UnknownKind::Shared(_))) {
             has_start(model.start_samples, record)?;
         }
     }
@@ -58,7 +58,7 @@ pub(crate) fn check(model: &Model, records: &[Measured]) -> Result<(), JudgeErro
 }
 
 /// Whether a record has samples for its start, and others.
-fn has_start(start: usize, record: &Measured) -> Result<(), JudgeError> {
+fn has_start(start: usize, record: &MeasuredRecord) -> Result<(), JudgeError> {
     let (name, rows) = (&record.name, record.time_s.len());
     match start {
         0 => Err(JudgeError::NoStart),
@@ -69,20 +69,24 @@ fn has_start(start: usize, record: &Measured) -> Result<(), JudgeError> {
 
 /// Rms and traces of both models on each held-out record.
 pub(crate) fn judge(
-    found: &Found<'_>,
-    records: &[Measured],
-) -> Result<(Vec<Judged>, Vec<Traces>), JudgeError> {
+    found: &SearchResult<'_>,
+    records: &[MeasuredRecord],
+) -> Result<(Vec<HeldOutResidual>, Vec<Traces>), JudgeError> {
     let (mut judged, mut traces) = (Vec::new(), Vec::new());
     for (index, record) in records.iter().enumerate() {
         let one = std::slice::from_ref(record);
         let (before, first_row) = residuals(&found.baseline, one)?;
         let (after, _) = residuals(&found.extended, one)?;
         let outputs = before.into_iter().zip(after).enumerate().map(
-            |(output, ([left, said], [left_after, extended]))| {
+            |(output, ([left, predicted], [left_after, extended]))| {
                 let scored_rows = left[first_row..].iter().filter(|value| value.is_finite()).count();
                 let rms_si = [&left, &left_after].map(|left| rms_of(left, first_row));
-                judged.push(Judged { record: index, output, rms_si, scored_rows });
-                [left.iter().zip(&said).map(|(left, said)| left + said).collect(), said, extended]
+                judged.push(HeldOutResidual { record: index, output, rms_si, scored_rows });
+                [
+                    left.iter().zip(&predicted).map(|(left, predicted)| left + predicted).collect(),
+                    predicted,
+                    extended,
+                ]
             },
         );
         let outputs = outputs.collect();
@@ -102,24 +106,24 @@ pub(crate) struct Alternative {
     pub(crate) suspect: usize,
     pub(crate) instead_of: usize,
     /// What the model alone and the model with it leave.
-    pub(crate) judged: Vec<Judged>,
+    pub(crate) judged: Vec<HeldOutResidual>,
 }
 
 /// What the extended model with each alternative that is as good leaves of the same records.
 pub(crate) fn alternatives(
     rivals: &[Rival<'_>],
-    records: &[Measured],
-    judged: &[Judged],
+    records: &[MeasuredRecord],
+    judged: &[HeldOutResidual],
 ) -> Result<Vec<Alternative>, JudgeError> {
     let of_rival = |rival: &Rival<'_>| {
         let Rival { suspect, instead_of, .. } = *rival;
         let failed = |why: &Failure| JudgeError::Failure { record: "training".into(), why: why.clone() };
         let fit = rival.fit.as_ref().map_err(failed)?;
-        let of_record = |one: &Judged| {
+        let of_record = |one: &HeldOutResidual| {
             let record = std::slice::from_ref(&records[one.record]);
             let (left, first_row) = residuals(fit, record)?;
             let rms_si = [one.rms_si[0], rms_of(&left[one.output][0], first_row)];
-            Ok(Judged { rms_si, ..one.clone() })
+            Ok(HeldOutResidual { rms_si, ..one.clone() })
         };
         let judged = judged.iter().map(of_record).collect::<Result<_, JudgeError>>()?;
         Ok(Alternative { suspect, instead_of, judged })
@@ -135,7 +139,7 @@ fn rms_of(left: &[f64], first_row: usize) -> f64 {
 }
 
 /// What a fitted model leaves of a record, and the first row that is scored.
-fn residuals(fitted: &Fitted<'_>, record: &[Measured]) -> Result<(OfRecord, usize), JudgeError> {
+fn residuals(fitted: &Fitted<'_>, record: &[MeasuredRecord]) -> Result<(OutputSeries, usize), JudgeError> {
     let rows = fitted.fitting.model.start_samples;
     let name = || record[0].name.clone();
     let frozen = Fitting::frozen(&fitted.fitting, &fitted.point, record, &fitted.suspects, rows);
@@ -151,16 +155,17 @@ fn residuals(fitted: &Fitted<'_>, record: &[Measured]) -> Result<(OfRecord, usiz
 }
 
 /// What both models say of the training records.
-pub(crate) fn trained(found: &Found<'_>) -> Result<Vec<Traces>, Failure> {
+pub(crate) fn trained(found: &SearchResult<'_>) -> Result<Vec<Traces>, Failure> {
     let all =
         [&found.baseline, &found.extended].map(|fitted| fitted.fitting.residuals(&fitted.point.values_si));
     let [before, after] = all;
     let (before, after) = (before?, after?);
     let records = found.baseline.fitting.records.iter().zip(before.into_iter().zip(after));
     let traces = records.map(|(record, (before, after))| {
-        let outputs = before.into_iter().zip(after).map(|([residual, said], [_, extended])| {
-            let measured = residual.iter().zip(&said).map(|(left, said)| left + said).collect();
-            [measured, said, extended]
+        let outputs = before.into_iter().zip(after).map(|([residual, predicted], [_, extended])| {
+            let measured =
+                residual.iter().zip(&predicted).map(|(left, predicted)| left + predicted).collect();
+            [measured, predicted, extended]
         });
         Traces {
             record: record.name.clone(),

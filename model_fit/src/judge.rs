@@ -16,7 +16,7 @@
 //!
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
-use super::fit::What;
+use super::fit::UnknownKind;
 use super::folds::{Folds, fold_t, gained, in_units};
 use super::select::Fitted;
 use crate::estimator::Convergence;
@@ -61,15 +61,15 @@ pub(crate) struct Evaluation {
     differences: Vec<f64>,
 }
 
-/// What a suspect is judged beside: the model alone, in whose power shares are, and the fit without the suspect.
+/// Fits that a suspect is judged against: the model alone, whose power is the unit of shares, and the fit without the suspect.
 #[derive(Clone, Copy)]
-pub(super) struct Sides<'f, 'a> {
+pub(super) struct ReferenceFits<'f, 'a> {
     pub(super) baseline: &'f Fitted<'a>,
     pub(super) before: &'f Fitted<'a>,
 }
 
 /// Share of the power that the model alone leaves on folds which is left before: no suspect explains more.
-pub(super) fn most_share(Sides { baseline, before }: Sides<'_, '_>) -> f64 {
+pub(super) fn most_share(ReferenceFits { baseline, before }: ReferenceFits<'_, '_>) -> f64 {
     let [plain, left] =
         [baseline, before].map(|one| in_units(&one.folds, before).iter().sum::<f64>().max(f64::MIN_POSITIVE));
     left / plain
@@ -77,26 +77,27 @@ pub(super) fn most_share(Sides { baseline, before }: Sides<'_, '_>) -> f64 {
 
 /// Judges a suspect; where its likelihood gains and its folds by linear steps lose, by folds that are fitted.
 pub(super) fn judge(
-    sides: Sides<'_, '_>,
+    reference_fits: ReferenceFits<'_, '_>,
     after: &Fitted<'_>,
     suspect: usize,
     of_round: (usize, &[f64]),
 ) -> Evaluation {
-    let linear = judge_by_folds(sides, after, suspect, of_round);
+    let linear = judge_by_folds(reference_fits, after, suspect, of_round);
     if linear.passes || linear.share >= 0.0 || linear.gain <= linear.penalty {
         return linear;
     }
-    let [baseline, before, after] = [sides.baseline, sides.before, after].map(Fitted::by_fits);
+    let [baseline, before, after] =
+        [reference_fits.baseline, reference_fits.before, after].map(Fitted::by_fits);
     match (baseline, before, after) {
         (Some(baseline), Some(before), Some(after)) => {
-            judge_by_folds(Sides { baseline: &baseline, before: &before }, &after, suspect, of_round)
+            judge_by_folds(ReferenceFits { baseline: &baseline, before: &before }, &after, suspect, of_round)
         }
         _ => linear,
     }
 }
 
 fn judge_by_folds(
-    Sides { baseline, before }: Sides<'_, '_>,
+    ReferenceFits { baseline, before }: ReferenceFits<'_, '_>,
     after: &Fitted<'_>,
     suspect: usize,
     (tried, samples): (usize, &[f64]),
@@ -163,8 +164,8 @@ fn judge_by_folds(
     let (score, gate) =
         gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are three at least");
     let unknowns = after.fitting.unknowns.iter().zip(&after.point.values_si);
-    let values_si = unknowns.filter_map(|(unknown, value)| match unknown.what {
-        What::Shared(index) | What::OfRecord(index, 0)
+    let values_si = unknowns.filter_map(|(unknown, value)| match unknown.kind {
+        UnknownKind::Shared(index) | UnknownKind::PerRecord(index, 0)
             if after.fitting.model.parameters[index].suspect == Some(suspect) =>
         {
             Some((index, *value))

@@ -84,18 +84,18 @@ mod unit_row;
 pub use adequacy::Residual;
 pub use begin::{NewError, NewModel, Roles, new_model};
 pub use discover::{DiscoveredTerm, Located, Place};
-pub use explain::{Explained, explain, explained};
+pub use explain::{Explanation, explain, explained};
 pub use extended::{ExtendError, extended};
 pub use held_out::{JudgeError, WORSE};
 pub use processing::SPARSEST;
 pub use record::RecordError;
-pub use report::{Left, ModelReport, Number, OfAlternative};
+pub use report::{AlternativeResidual, ModelReport, ParameterEstimate, ResidualComparison};
 pub use runlog::discrepancy_report::Verdict;
-pub use simulate::{Simulated, SimulatedOutput, simulate};
+pub use simulate::{SimulatedOutput, SimulatedRecord, simulate};
 
 use held_out::Traces;
 use model::{Failure, Model};
-use record::Measured;
+use record::MeasuredRecord;
 use std::path::{Path, PathBuf};
 
 /// Why a model file cannot be closed.
@@ -196,7 +196,7 @@ pub fn close_with(
     progress: &mut dyn FnMut(&str),
 ) -> Result<ClosedModel, ModelError> {
     let model = read(file)?;
-    let records = looked_at(&model, train)?;
+    let records = read_with_notes(&model, train)?;
     // Before the fit, which may take minutes.
     for record in &records {
         record.notes.iter().for_each(|note| progress(&format!("{}: {note}", record.name)));
@@ -206,16 +206,16 @@ pub fn close_with(
     let found = select::search(&model, &records, progress)?;
     progress("structure");
     let structure = structure::structure(&found.baseline, &found.extended);
-    let grown = is_searched(&found, search)?.then(|| match (search, found.baseline.point.steps) {
+    let with_terms = is_searched(&found, search)?.then(|| match (search, found.baseline.point.steps) {
         (Search::MoreThanNoise, steps) if steps > MOST_STEPS_UNASKED => Err(format!(
             "a simulation has {steps} steps, and a search makes hundreds: --discover asks for one"
         )),
-        _ => discover::grown(&found.baseline),
+        _ => discover::with_terms(&found.baseline),
     });
     let located = progress::with_progress(progress, ("where it comes from: steps", 1), |_| {
         discover::located(&found.baseline)
     });
-    let (found, mut report) = match &grown {
+    let (found, mut report) = match &with_terms {
         None => {
             let report = report::report(file, &found, &structure);
             (found, report)
@@ -225,8 +225,8 @@ pub fn close_with(
             report.notes.push(format!("nothing was searched: {why}"));
             (found, report)
         }
-        Some(Ok(grown)) => {
-            let discovery = discover::search(grown, &records, found, progress)?;
+        Some(Ok(with_terms)) => {
+            let discovery = discover::search(with_terms, &records, found, progress)?;
             let mut report = report::report(file, &discovery.found, &structure);
             report.describe(&discovery);
             (discovery.found, report)
@@ -258,8 +258,8 @@ pub fn close_with(
     Ok(ClosedModel { report, not_judged, page, extended })
 }
 
-fn is_searched(found: &select::Found<'_>, search: Search) -> Result<bool, ModelError> {
-    Ok(found.taken.is_empty()
+fn is_searched(found: &select::SearchResult<'_>, search: Search) -> Result<bool, ModelError> {
+    Ok(found.accepted.is_empty()
         && match search {
             Search::MoreThanNoise => !adequacy::residuals(&found.extended)?.iter().all(|left| left.is_noise),
             Search::NothingNamed => true,
@@ -267,22 +267,22 @@ fn is_searched(found: &select::Found<'_>, search: Search) -> Result<bool, ModelE
         })
 }
 
-/// What there is to say of a record before anything is fitted.
+/// Size and notes of a record, before anything is fitted.
 #[derive(Clone, Debug, serde::Serialize)]
-pub struct Look {
+pub struct RecordPreview {
     pub record: String,
     pub rows: usize,
     pub length_s: f64,
     pub notes: Vec<String>,
 }
 
-/// Looks at records as [`close`] does, and fits nothing.
+/// Reads and checks records as [`close`] does, and fits nothing.
 ///
 /// # Errors
 /// [`ModelError`] for a model or a record that cannot be used.
-pub fn look(file: &Path, records: &[PathBuf]) -> Result<Vec<Look>, ModelError> {
-    let all = looked_at(&read(file)?, records)?;
-    let of = |record: Measured| Look {
+pub fn preview_records(file: &Path, records: &[PathBuf]) -> Result<Vec<RecordPreview>, ModelError> {
+    let all = read_with_notes(&read(file)?, records)?;
+    let of = |record: MeasuredRecord| RecordPreview {
         rows: record.rows.len(),
         length_s: record.sampled_s.last().unwrap_or(&0.0) - record.sampled_s[0],
         record: record.name,
@@ -292,26 +292,27 @@ pub fn look(file: &Path, records: &[PathBuf]) -> Result<Vec<Look>, ModelError> {
 }
 
 /// Records with what they look like beside the model among their notes.
-fn looked_at(model: &Model, files: &[PathBuf]) -> Result<Vec<Measured>, ModelError> {
+fn read_with_notes(model: &Model, files: &[PathBuf]) -> Result<Vec<MeasuredRecord>, ModelError> {
     let mut records = read_all(model, files)?;
     look::beside_model(model, &mut records);
     Ok(records)
 }
 
-fn read_all(model: &Model, files: &[PathBuf]) -> Result<Vec<Measured>, RecordError> {
-    files.iter().map(|path| Measured::read(model, path)).collect()
+fn read_all(model: &Model, files: &[PathBuf]) -> Result<Vec<MeasuredRecord>, RecordError> {
+    files.iter().map(|path| MeasuredRecord::read(model, path)).collect()
 }
 
-/// What both models leave, what alternatives do, what both models say, and notes of the records.
-type Judgement = (Vec<held_out::Judged>, Vec<held_out::Alternative>, Vec<Traces>, Vec<String>);
+/// Residuals of both models, those of alternatives, predictions of both models, and notes of the records.
+type HeldOutJudgement =
+    (Vec<held_out::HeldOutResidual>, Vec<held_out::Alternative>, Vec<Traces>, Vec<String>);
 
 /// Both models on the held-out records; `None` where there is none.
 fn judged(
     model: &Model,
-    (found, rivals): (&select::Found<'_>, &[select::Rival<'_>]),
-    mut records: Vec<Measured>,
+    (found, rivals): (&select::SearchResult<'_>, &[select::Rival<'_>]),
+    mut records: Vec<MeasuredRecord>,
     progress: &mut dyn FnMut(&str),
-) -> Result<Option<Judgement>, String> {
+) -> Result<Option<HeldOutJudgement>, String> {
     if records.is_empty() {
         return Ok(None);
     }

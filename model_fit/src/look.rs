@@ -15,7 +15,7 @@
 //! and holes of up to 0.3 s in those of the cylinder.
 
 use super::fit::Fitting;
-use super::record::Measured;
+use super::record::MeasuredRecord;
 use super::report::significant;
 use super::select::Fitted;
 use crate::equal_runs::stuck;
@@ -209,20 +209,20 @@ impl Column<'_> {
 }
 
 /// Adds to each record what it looks like beside the model at the values of its file; nothing where that cannot be simulated.
-pub(super) fn beside_model(model: &Model, records: &mut [Measured]) {
+pub(super) fn beside_model(model: &Model, records: &mut [MeasuredRecord]) {
     for record in records {
         let notes = of_record(model, record);
         record.notes.extend(notes);
     }
 }
 
-fn of_record(model: &Model, record: &Measured) -> Vec<String> {
-    let Some(said) = simulated(model, record) else { return Vec::new() };
+fn of_record(model: &Model, record: &MeasuredRecord) -> Vec<String> {
+    let Some(predicted) = simulated(model, record) else { return Vec::new() };
     let mut notes = Vec::new();
     for (output, of_model) in model.outputs.iter().enumerate() {
-        let agreement = correlation(&said[output], &record.outputs[output]);
+        let agreement = correlation(&predicted[output], &record.outputs[output]);
         let name = &of_model.name;
-        notes.extend(sizes(model, output, &said[output], &record.outputs[output]));
+        notes.extend(sizes(model, output, &predicted[output], &record.outputs[output]));
         if agreement < AGAINST {
             notes.push(format!(
                 "before the fit the model moves against {name} (correlation {agreement:.2}): is a sign wrong, in the record \
@@ -234,12 +234,13 @@ fn of_record(model: &Model, record: &Measured) -> Vec<String> {
             continue;
         }
         let others = model.outputs.iter().enumerate().filter(|(other, _)| *other != output);
-        let like = others.map(|(other, of)| (correlation(&said[output], &record.outputs[other]), &of.column));
+        let like =
+            others.map(|(other, of)| (correlation(&predicted[output], &record.outputs[other]), &of.column));
         let inputs = model.inputs.iter().enumerate().filter(|(_, input)| input.rate_of.is_none());
         let exchanged = inputs.filter_map(|(input, of)| {
             let exchanged = exchange(record, input, output)?;
-            let said = simulated(model, &exchanged)?;
-            Some((correlation(&said[output], &exchanged.outputs[output]), &of.column))
+            let predicted = simulated(model, &exchanged)?;
+            Some((correlation(&predicted[output], &exchanged.outputs[output]), &of.column))
         });
         let best = like.chain(exchanged).max_by(|one, other| one.0.total_cmp(&other.0));
         if let Some((best, column)) = best.filter(|(best, _)| *best > SAME_SHAPE) {
@@ -254,10 +255,12 @@ fn of_record(model: &Model, record: &Measured) -> Vec<String> {
 }
 
 /// A note where a model at the values of its file is of another size than the record.
-fn sizes(model: &Model, output: usize, said: &[f64], measured: &[Option<f64>]) -> Option<String> {
-    let pairs = said.iter().zip(measured).filter_map(|(said, measured)| Some([*said, (*measured)?]));
-    let squares =
-        pairs.fold([0.0, 0.0], |[x, y], [said, measured]| [x + said * said, y + measured * measured]);
+fn sizes(model: &Model, output: usize, predicted: &[f64], measured: &[Option<f64>]) -> Option<String> {
+    let pairs =
+        predicted.iter().zip(measured).filter_map(|(predicted, measured)| Some([*predicted, (*measured)?]));
+    let squares = pairs.fold([0.0, 0.0], |[x, y], [predicted, measured]| {
+        [x + predicted * predicted, y + measured * measured]
+    });
     let ratio = (squares[0] / squares[1]).sqrt();
     let is_other = ratio > 0.0 && ratio.is_finite() && ratio.max(1.0 / ratio) > SIZES;
     is_other.then(|| {
@@ -287,15 +290,15 @@ fn are_right(model: &Model, output: usize) -> String {
 }
 
 /// What the model says at its first values, output by output.
-fn simulated(model: &Model, record: &Measured) -> Option<Vec<Vec<f64>>> {
+fn simulated(model: &Model, record: &MeasuredRecord) -> Option<Vec<Vec<f64>>> {
     let program = Program::new(model, &[]).ok()?;
     let fitting = Fitting::new(model, program, std::slice::from_ref(record), &[]);
-    let said = fitting.residuals(&fitting.start()).ok()?.pop()?;
-    Some(said.into_iter().map(|[_, said]| said).collect())
+    let predicted = fitting.residuals(&fitting.start()).ok()?.pop()?;
+    Some(predicted.into_iter().map(|[_, predicted]| predicted).collect())
 }
 
 /// The record with an input's column as the output's, and the other way round; `None` where they are not sampled alike.
-fn exchange(record: &Measured, input: usize, output: usize) -> Option<Measured> {
+fn exchange(record: &MeasuredRecord, input: usize, output: usize) -> Option<MeasuredRecord> {
     if record.rows.len() != record.sampled_s.len() || record.thinning.is_some() {
         return None;
     }
@@ -307,15 +310,17 @@ fn exchange(record: &Measured, input: usize, output: usize) -> Option<Measured> 
 }
 
 /// Correlation of what is said and what was measured; 0 where one of them does not move.
-fn correlation(said: &[f64], measured: &[Option<f64>]) -> f64 {
-    let pairs = said.iter().zip(measured).filter_map(|(said, measured)| Some((*said, (*measured)?)));
-    let (said, measured): (Vec<f64>, Vec<f64>) = pairs.filter(|(said, _)| said.is_finite()).unzip();
-    if said.len() < 2 {
+fn correlation(predicted: &[f64], measured: &[Option<f64>]) -> f64 {
+    let pairs =
+        predicted.iter().zip(measured).filter_map(|(predicted, measured)| Some((*predicted, (*measured)?)));
+    let (predicted, measured): (Vec<f64>, Vec<f64>) =
+        pairs.filter(|(predicted, _)| predicted.is_finite()).unzip();
+    if predicted.len() < 2 {
         return 0.0;
     }
-    let [(m, v), (n, w)] = [mean_and_variance(&said), mean_and_variance(&measured)];
-    let products: f64 = said.iter().zip(&measured).map(|(x, y)| (x - m) * (y - n)).sum();
-    let scale = (v * w).sqrt() * (said.len() as f64 - 1.0);
+    let [(m, v), (n, w)] = [mean_and_variance(&predicted), mean_and_variance(&measured)];
+    let products: f64 = predicted.iter().zip(&measured).map(|(x, y)| (x - m) * (y - n)).sum();
+    let scale = (v * w).sqrt() * (predicted.len() as f64 - 1.0);
     if scale > 0.0 { products / scale } else { 0.0 }
 }
 

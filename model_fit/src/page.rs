@@ -4,7 +4,7 @@ use super::adequacy::Residual;
 use super::explain::in_words;
 use super::held_out::Traces;
 use super::judge::share_in_words;
-use super::report::{Judgement, Left, ModelReport, Number, significant};
+use super::report::{ModelReport, ParameterEstimate, ResidualComparison, SuspectJudgement, significant};
 use super::term_curves::{Bin, TermCurve};
 use super::typeset;
 use model::Model;
@@ -242,7 +242,7 @@ fn located(report: &ModelReport) -> String {
     report.located_in_words().map_or_else(String::new, |located| paragraph(&sentence(&located)))
 }
 
-fn left(label: &str, all: &[Left]) -> String {
+fn left(label: &str, all: &[ResidualComparison]) -> String {
     let rows = all.iter().map(|one| {
         vec![
             words(&one.record),
@@ -258,15 +258,15 @@ fn left(label: &str, all: &[Left]) -> String {
 
 fn alternatives(report: &ModelReport) -> String {
     let rows = report.held_out_alternatives.iter().map(|one| {
-        let value = |value: f64| number(format!("{} {}", significant(value), one.left.unit));
+        let value = |value: f64| number(format!("{} {}", significant(value), one.residual.unit));
         vec![
             words(&one.suspect),
             words(&one.instead_of),
-            words(&one.left.record),
-            words(&one.left.output),
-            value(one.left.rms_before),
-            value(one.left.rms_after),
-            number(one.left.ratio.map_or_else(String::new, significant)),
+            words(&one.residual.record),
+            words(&one.residual.output),
+            value(one.residual.rms_before),
+            value(one.residual.rms_after),
+            number(one.residual.ratio.map_or_else(String::new, significant)),
         ]
     });
     let heads = ["with", "in place of", "record", "output", "model, rms", "extended, rms", "ratio"];
@@ -297,7 +297,7 @@ fn residuals(all: &[Residual]) -> String {
     table("What is left, and its noise", &heads, rows)
 }
 
-fn suspects(all: &[Judgement]) -> String {
+fn suspects(all: &[SuspectJudgement]) -> String {
     let rows = all.iter().map(|one| {
         let name = if one.is_decoy { format!("{} (decoy)", one.suspect) } else { one.suspect.clone() };
         let values: Vec<String> = one
@@ -319,7 +319,7 @@ fn suspects(all: &[Judgement]) -> String {
     table("Suspects beside the model alone", &heads, rows)
 }
 
-fn numbers(all: &[Number]) -> String {
+fn numbers(all: &[ParameterEstimate]) -> String {
     let rows = all.iter().map(|one| {
         let error =
             one.standard_error.map_or("not determined".into(), |error| format!("± {}", significant(error)));

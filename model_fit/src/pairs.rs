@@ -12,12 +12,12 @@
 //!
 //! Source: Miller 2002, Subset Selection in Regression, 2nd edition, 3.9 (replacing two at a time).
 
-use super::fit::{Fitting, What};
-use super::judge::{Evaluation, GAIN_APART, Sides, judge};
-use super::progress::Done;
-use super::select::{Fitted, Found, fitted_from};
+use super::fit::{Fitting, UnknownKind};
+use super::judge::{Evaluation, GAIN_APART, ReferenceFits, judge};
+use super::progress::ProgressCounter;
+use super::select::{Fitted, SearchResult, fitted_from};
 use super::starts;
-use super::structure::{self, Beside};
+use super::structure::{self, LinearisedFit};
 use nalgebra::DVector;
 use rayon::prelude::*;
 
@@ -37,7 +37,7 @@ pub(super) struct Pair<'a> {
 /// A suspect at a point: its numbers by parameter, and what it does.
 struct Response {
     suspect: usize,
-    values_si: Vec<(What, f64)>,
+    values_si: Vec<(UnknownKind, f64)>,
     change: DVector<f64>,
     /// Its product with what the model leaves, and with itself.
     gain: f64,
@@ -46,15 +46,15 @@ struct Response {
 
 /// The best of the pairs that pass; where none does, what the nearest fails, in words, if there are pairs.
 pub(super) fn best<'a>(
-    found: &Found<'a>,
+    found: &SearchResult<'a>,
     alone: &[(usize, Fitted<'a>)],
-    done: &Done,
+    done: &ProgressCounter,
 ) -> Result<Pair<'a>, Option<String>> {
     chosen(fitted_pairs(found, alone, done), |suspect| &found.baseline.fitting.model.suspects[suspect].name)
 }
 
 /// A pair as it was fitted, and how it is judged.
-struct Judged<'a> {
+struct JudgedPair<'a> {
     fit: Fitted<'a>,
     worth: f64,
     members: [Evaluation; 2],
@@ -63,10 +63,10 @@ struct Judged<'a> {
 }
 
 fn fitted_pairs<'a>(
-    found: &Found<'a>,
+    found: &SearchResult<'a>,
     alone: &[(usize, Fitted<'a>)],
-    done: &Done,
-) -> Option<Vec<Judged<'a>>> {
+    done: &ProgressCounter,
+) -> Option<Vec<JudgedPair<'a>>> {
     let base = &found.baseline;
     let suspects = &base.fitting.model.suspects;
     let alone: Vec<&(usize, Fitted<'a>)> =
@@ -75,7 +75,7 @@ fn fitted_pairs<'a>(
     let responses = responses(base, &alone)?;
     let fits = promising(&responses).into_par_iter().filter_map(|(pair, points)| {
         let fit = fit(found, &alone, &responses, pair, &points);
-        done.one_more();
+        done.increment();
         fit
     });
     let fits: Vec<([usize; 2], Fitted<'a>)> = fits.collect();
@@ -84,25 +84,25 @@ fn fitted_pairs<'a>(
     let of_alone = |suspect: usize| alone.iter().find(|(one, _)| *one == suspect).map(|(_, fit)| fit);
     let judged = fits.into_iter().filter_map(|(pair, fit)| {
         let beside = |before: &Fitted<'a>, suspect: usize| {
-            judge(Sides { baseline: base, before }, &fit, suspect, (tried, &effective))
+            judge(ReferenceFits { baseline: base, before }, &fit, suspect, (tried, &effective))
         };
         let whole = beside(base, pair[0]);
         let members = [beside(of_alone(pair[1])?, pair[0]), beside(of_alone(pair[0])?, pair[1])];
         let gates = [(&whole, "the two"), (&members[0], "the first"), (&members[1], "the second")];
         let failed = gates.into_iter().find(|(one, _)| !one.passes);
         let fails = failed.map(|(one, which)| format!("{which}: {}", one.gate));
-        Some(Judged { fit, worth: whole.worth(), members, fails })
+        Some(JudgedPair { fit, worth: whole.worth(), members, fails })
     });
     Some(judged.collect())
 }
 
 fn chosen<'a, 'n>(
-    judged: Option<Vec<Judged<'a>>>,
+    judged: Option<Vec<JudgedPair<'a>>>,
     name: impl Fn(usize) -> &'n String,
 ) -> Result<Pair<'a>, Option<String>> {
     let mut judged = judged.unwrap_or_default();
     judged.sort_by(|one, other| other.worth.total_cmp(&one.worth));
-    let pair_of = |one: &Judged<'_>| [0, 1].map(|place| one.members[place].suspect);
+    let pair_of = |one: &JudgedPair<'_>| [0, 1].map(|place| one.members[place].suspect);
     let Some(best) = judged.iter().position(|one| one.fails.is_none()) else {
         let nearest = judged.first().map(|nearest| {
             let [one, other] = pair_of(nearest).map(&name);
@@ -112,7 +112,8 @@ fn chosen<'a, 'n>(
         return Err(nearest);
     };
     let best = judged.swap_remove(best);
-    let is_as_good = |other: &&Judged<'_>| other.fails.is_none() && best.worth - other.worth <= GAIN_APART;
+    let is_as_good =
+        |other: &&JudgedPair<'_>| other.fails.is_none() && best.worth - other.worth <= GAIN_APART;
     let others: Vec<[usize; 2]> = judged.iter().filter(is_as_good).map(pair_of).collect();
     let pair = pair_of(&best);
     let alternatives = |mine: usize| {
@@ -134,22 +135,23 @@ fn in_place_of([one, two]: [usize; 2], [first, second]: [usize; 2]) -> [usize; 2
 /// What each suspect does at several points of its ranges, beside the model alone.
 fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Response>> {
     let (fitting, point) = (&base.fitting, &base.point);
-    let beside = Beside::new(fitting, point)?;
-    let (taken, values_si, scale) = (&base.suspects[..], &point.values_si[..], &beside.scale[..]);
-    let base = structure::Base { fitting, taken, values_si, scale };
+    let beside = LinearisedFit::new(fitting, point)?;
+    let (accepted, values_si, scale) = (&base.suspects[..], &point.values_si[..], &beside.scale[..]);
+    let base = structure::ReferenceModel { fitting, accepted, values_si, scale };
     let of_suspect = |(suspect, fit): &&(usize, Fitted<'_>)| -> Vec<Response> {
-        let of_this = |values_si: &[f64]| -> Vec<(What, f64)> {
+        let of_this = |values_si: &[f64]| -> Vec<(UnknownKind, f64)> {
             let all = fit.fitting.unknowns.iter().zip(values_si);
             let chosen = all.filter(|(unknown, _)| fit.fitting.suspect_of(unknown) == Some(*suspect));
-            chosen.map(|(unknown, value)| (unknown.what, *value)).collect()
+            chosen.map(|(unknown, value)| (unknown.kind, *value)).collect()
         };
         let points = starts::of_newest(&fit.fitting, &fit.suspects, (fitting, point));
         let points = points.iter().map(Vec::as_slice).chain([fit.point.values_si.as_slice()]);
         let response = |values_si: &[f64]| {
             let values_si = of_this(values_si);
-            let change = beside.rest(base.changed(*suspect, &values_si).ok()? - &beside.said);
+            let change =
+                beside.project_off(base.outputs_with(*suspect, &values_si).ok()? - &beside.predictions);
             let size = change.norm_squared();
-            let gain = change.dot(&beside.left);
+            let gain = change.dot(&beside.residual);
             (size > 0.0 && size.is_finite()).then_some(Response {
                 suspect: *suspect,
                 values_si,
@@ -205,7 +207,7 @@ fn fall(one: &Response, other: &Response) -> Option<f64> {
 
 /// Fits a pair from its best points, and from each of the two alone with the other at these points.
 fn fit<'a>(
-    found: &Found<'a>,
+    found: &SearchResult<'a>,
     alone: &[&(usize, Fitted<'a>)],
     responses: &[Response],
     pair: [usize; 2],
@@ -215,19 +217,19 @@ fn fit<'a>(
     let (model, records) = (base.fitting.model, base.fitting.records);
     let suspects: Vec<usize> = base.suspects.iter().copied().chain(pair).collect();
     let starts = |fitting: &Fitting<'a>| -> Vec<Vec<f64>> {
-        let values_of = |fit: &Fitted<'a>| -> Vec<(What, f64)> {
+        let values_of = |fit: &Fitted<'a>| -> Vec<(UnknownKind, f64)> {
             let all = fit.fitting.unknowns.iter().zip(&fit.point.values_si);
-            all.map(|(unknown, value)| (unknown.what, *value)).collect()
+            all.map(|(unknown, value)| (unknown.kind, *value)).collect()
         };
-        let with = |known: &[&[(What, f64)]]| -> Vec<f64> {
-            let value = |what: What| {
+        let with = |known: &[&[(UnknownKind, f64)]]| -> Vec<f64> {
+            let value = |kind: UnknownKind| {
                 known
                     .iter()
                     .rev()
-                    .find_map(|values| values.iter().find(|(of, _)| *of == what))
+                    .find_map(|values| values.iter().find(|(of, _)| *of == kind))
                     .map(|(_, value)| *value)
             };
-            fitting.unknowns.iter().map(|unknown| value(unknown.what).unwrap_or(unknown.start_si)).collect()
+            fitting.unknowns.iter().map(|unknown| value(unknown.kind).unwrap_or(unknown.start_si)).collect()
         };
         let begin = values_of(base);
         let mut all = Vec::new();

@@ -9,7 +9,7 @@
 
 use super::filter::LowPass;
 use super::look::{HOLE, is_in_hole, usual_period_s};
-use super::record::{FEWEST_ROWS, Measured, RecordError};
+use super::record::{FEWEST_ROWS, MeasuredRecord, RecordError};
 use super::report::significant;
 use model::{Hold, Input, Inputs, Model};
 
@@ -27,8 +27,8 @@ pub(super) struct Grid {
     is_record: bool,
 }
 
-/// What a record is called, and what a person should know about it.
-pub(super) struct Names {
+/// File, name and notes of a record.
+pub(super) struct RecordInfo {
     pub(super) file: String,
     pub(super) name: String,
     pub(super) notes: Vec<String>,
@@ -125,10 +125,10 @@ impl Grid {
     pub(super) fn compared(
         self,
         model: &Model,
-        Names { file, name, notes }: Names,
+        RecordInfo { file, name, notes }: RecordInfo,
         inputs: Vec<Vec<f64>>,
         outputs: Vec<Vec<Option<f64>>>,
-    ) -> Result<Measured, RecordError> {
+    ) -> Result<MeasuredRecord, RecordError> {
         let of_model = &model.rows;
         let thinning = (of_model.every > 1).then(|| {
             let edge = of_model.edge / of_model.every as f64;
@@ -163,7 +163,7 @@ impl Grid {
         let inside = |at_s: &f64| at_s - first_s >= of_model.ends_s && last_s - at_s >= of_model.ends_s;
         let is_judged = time_s.iter().map(inside).collect();
         let file = file.into();
-        Ok(Measured {
+        Ok(MeasuredRecord {
             file,
             name,
             sampled_s,
@@ -179,7 +179,7 @@ impl Grid {
     }
 }
 
-impl Measured {
+impl MeasuredRecord {
     /// Samples that are simulated so that the first of its rows are reached; all of them before a filter.
     pub(super) fn samples_of(&self, rows: usize) -> usize {
         match self.thinning {

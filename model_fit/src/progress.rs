@@ -7,10 +7,10 @@ use std::time::Duration;
 const EVERY: Duration = Duration::from_secs(10);
 
 /// Parts of the work that are done.
-pub(super) struct Done(AtomicUsize);
+pub(super) struct ProgressCounter(AtomicUsize);
 
-impl Done {
-    pub(super) fn one_more(&self) {
+impl ProgressCounter {
+    pub(super) fn increment(&self) {
         self.0.fetch_add(1, Ordering::Relaxed);
     }
 }
@@ -19,7 +19,7 @@ impl Done {
 pub(super) fn with_progress<T: Send>(
     progress: &mut dyn FnMut(&str),
     (what, parts): (&str, usize),
-    work: impl FnOnce(&Done) -> T + Send,
+    work: impl FnOnce(&ProgressCounter) -> T + Send,
 ) -> T {
     every(EVERY, progress, (what, parts), work)
 }
@@ -28,9 +28,9 @@ fn every<T: Send>(
     period: Duration,
     progress: &mut dyn FnMut(&str),
     (what, parts): (&str, usize),
-    work: impl FnOnce(&Done) -> T + Send,
+    work: impl FnOnce(&ProgressCounter) -> T + Send,
 ) -> T {
-    let done = Done(AtomicUsize::new(0));
+    let done = ProgressCounter(AtomicUsize::new(0));
     std::thread::scope(|scope| {
         let (sender, receiver) = channel();
         let seen = &done;
@@ -67,7 +67,7 @@ mod tests {
             let _ = sender.try_send(());
         };
         let result = every(Duration::from_millis(1), &mut progress, ("fits", 2), move |done| {
-            done.one_more();
+            done.increment();
             // Until a line was printed.
             receiver.recv().expect("the other end waits");
             7

@@ -2,8 +2,8 @@
 
 use super::filter::LowPass;
 use super::look::{self, Column, StuckFrom};
-use super::processing::{Grid, Names};
-use super::unit_row::{self, OtherUnit};
+use super::processing::{Grid, RecordInfo};
+use super::unit_row::{self, UnitMismatch};
 use model::{Input, Model};
 use records::{ColumnOptions, Columns, ReadError, read_columns};
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ pub enum RecordError {
     #[error("{file}:{line}: {time_s} s: {rows} rows cannot reach as far at a period of {period_s} s")]
     Far { file: String, line: u64, time_s: f64, rows: usize, period_s: f64 },
     #[error(transparent)]
-    OtherUnit(Box<OtherUnit>),
+    UnitMismatch(Box<UnitMismatch>),
     #[error("{file}: low_pass_hz of input {name} is {edge_hz}; allowed is below half of {sampling_hz} Hz")]
     Edge { file: String, name: String, edge_hz: f64, sampling_hz: f64 },
     #[error(
@@ -52,7 +52,7 @@ pub enum RecordError {
 
 /// A record of a model.
 #[derive(Clone, Debug)]
-pub(crate) struct Measured {
+pub(crate) struct MeasuredRecord {
     pub(crate) name: String,
     /// Times of all samples, over which the model is simulated.
     pub(crate) sampled_s: Vec<f64>,
@@ -74,7 +74,7 @@ pub(crate) struct Measured {
     pub(crate) notes: Vec<String>,
 }
 
-impl Measured {
+impl MeasuredRecord {
     pub(crate) fn read(model: &Model, file: &Path) -> Result<Self, RecordError> {
         let layout = &model.record;
         let columns = model.inputs.iter().filter(|input| input.rate_of.is_none());
@@ -160,7 +160,7 @@ impl Measured {
         let outputs = outputs.collect();
         let name =
             Path::new(&file).file_name().map_or(file.clone(), |name| name.to_string_lossy().into_owned());
-        grid.compared(model, Names { file, name, notes }, inputs, outputs)
+        grid.compared(model, RecordInfo { file, name, notes }, inputs, outputs)
     }
 }
 
@@ -185,12 +185,12 @@ fn all_listed(model: &Model, file: &Path) -> Result<(), RecordError> {
 mod tests {
     use super::*;
 
-    fn read(text: &str) -> Result<Measured, RecordError> {
+    fn read(text: &str) -> Result<MeasuredRecord, RecordError> {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), text).unwrap();
         let model = "[record]\ntime = \"t\"\n[inputs.u]\nunit = \"mm\"\nhold = \"linear\"\n\
                      [outputs.y]\nunit = \"mm\"\nvalue = \"u\"\n";
-        Measured::read(&Model::parse(model, Path::new("m.toml")).unwrap(), file.path())
+        MeasuredRecord::read(&Model::parse(model, Path::new("m.toml")).unwrap(), file.path())
     }
 
     #[test]
@@ -216,7 +216,7 @@ mod tests {
             let model = format!(
                 "[record]\ntime = \"t\"\nperiod_s = {period}\n[inputs.u]\n[outputs.y]\nvalue = \"u\"\n"
             );
-            let read = Measured::read(&Model::parse(&model, Path::new("m.toml")).unwrap(), file.path());
+            let read = MeasuredRecord::read(&Model::parse(&model, Path::new("m.toml")).unwrap(), file.path());
             read.unwrap().notes.into_iter().filter(|note| note.contains("period_s")).collect::<Vec<_>>()
         };
         assert_eq!(
@@ -238,7 +238,9 @@ mod tests {
             let text = format!(
                 "[outputs.y]\nvalue = \"1\"\n[outputs.again]\ncolumn = \"{second}\"\nvalue = \"t/1[s]\"\n"
             );
-            Measured::read(&Model::parse(&text, Path::new("m.toml")).unwrap(), file.path()).unwrap().notes
+            MeasuredRecord::read(&Model::parse(&text, Path::new("m.toml")).unwrap(), file.path())
+                .unwrap()
+                .notes
         };
         assert!(notes("t_s").iter().all(|note| !note.contains("two measurements")));
         let expected = "column y is both y and again: its noise counts as two measurements";

@@ -5,11 +5,11 @@ use super::bounds;
 use super::covariance;
 use super::discover::{DiscoveredTerm, Located};
 use super::fit::Fitting;
-use super::held_out::{Alternative, Judged, Traces};
+use super::held_out::{Alternative, HeldOutResidual, Traces};
 use super::judge::{Evaluation, by_effect, is_one_effect};
 use super::look;
-use super::record::Measured;
-use super::select::{Fitted, Found, Taken};
+use super::record::MeasuredRecord;
+use super::select::{AcceptedSuspect, Fitted, SearchResult};
 use super::structure::Structure;
 use crate::Verdict;
 use crate::estimator::Outcome;
@@ -44,17 +44,17 @@ pub struct ModelReport {
     #[serde(skip_deserializing)]
     pub residuals: Vec<Residual>,
     /// Numbers of the extended model, with what they were beside the model alone.
-    pub parameters: Vec<Number>,
+    pub parameters: Vec<ParameterEstimate>,
     /// What is left on the training records.
     #[serde(skip_deserializing)]
-    pub training: Vec<Left>,
+    pub training: Vec<ResidualComparison>,
     /// What is left on each held-out record.
     #[serde(skip_deserializing)]
-    pub held_out: Vec<Left>,
+    pub held_out: Vec<ResidualComparison>,
     /// The same with each alternative in place of what was named.
     #[serde(skip_deserializing)]
-    pub held_out_alternatives: Vec<OfAlternative>,
-    pub named: Vec<Named>,
+    pub held_out_alternatives: Vec<AlternativeResidual>,
+    pub named: Vec<NamedSuspect>,
     /// Where nothing was named and a search found some: terms that no suspect describes.
     pub discovered: Vec<DiscoveredTerm>,
     /// Where what the model alone leaves comes from, whatever the suspects are; `None` where no place explains enough of it.
@@ -62,7 +62,7 @@ pub struct ModelReport {
     pub located: Option<Located>,
     /// Every suspect beside the model alone, the most likely first.
     #[serde(skip_deserializing)]
-    pub suspects: Vec<Judgement>,
+    pub suspects: Vec<SuspectJudgement>,
     #[serde(skip_deserializing)]
     pub structure: Structure,
     pub notes: Vec<String>,
@@ -75,9 +75,9 @@ pub struct ModelReport {
     pub declared: Vec<String>,
 }
 
-/// A number: estimate, error, and the estimate without what was named.
+/// A parameter: estimate, error, and the estimate without the named suspects.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Number {
+pub struct ParameterEstimate {
     pub name: String,
     /// The term or suspect that it belongs to; `None` for a number of the model.
     pub suspect: Option<String>,
@@ -98,9 +98,9 @@ pub struct Number {
     pub(crate) expected: Option<[f64; 2]>,
 }
 
-/// What both models leave of an output.
+/// Residuals of an output under both models.
 #[derive(Clone, Debug, Serialize)]
-pub struct Left {
+pub struct ResidualComparison {
     pub record: String,
     pub output: String,
     pub unit: String,
@@ -111,18 +111,18 @@ pub struct Left {
     pub rows: usize,
 }
 
-/// What an alternative leaves of a held-out record in place of what was named.
+/// Residuals of a held-out record with an alternative in place of the named suspect.
 #[derive(Clone, Debug, Serialize)]
-pub struct OfAlternative {
+pub struct AlternativeResidual {
     pub suspect: String,
     pub instead_of: String,
     #[serde(flatten)]
-    pub left: Left,
+    pub residual: ResidualComparison,
 }
 
 /// A suspect that is missing in the model.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct Named {
+pub struct NamedSuspect {
     pub suspect: String,
     /// What it is one form of.
     pub effect: Option<String>,
@@ -140,7 +140,7 @@ pub struct Named {
 
 /// Likelihood gain, gates and probability of a suspect.
 #[derive(Clone, Debug, Serialize)]
-pub struct Judgement {
+pub struct SuspectJudgement {
     pub suspect: String,
     pub place: String,
     pub is_decoy: bool,
@@ -154,47 +154,47 @@ pub struct Judgement {
     #[serde(rename = "clustered_t")]
     pub fold_t: f64,
     pub decision: String,
-    pub numbers: Vec<Number>,
+    pub numbers: Vec<ParameterEstimate>,
 }
 
-pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> ModelReport {
+pub(crate) fn report(file: &Path, found: &SearchResult<'_>, structure: &Structure) -> ModelReport {
     let fitting = &found.baseline.fitting;
     let model = fitting.model;
     let effect = |suspect: usize| {
         let suspect = &model.suspects[suspect];
         suspect.effect.as_ref().unwrap_or(&suspect.name).as_str()
     };
-    let names: Vec<&str> = found.taken.iter().map(|taken| effect(taken.evaluation.suspect)).collect();
+    let names: Vec<&str> =
+        found.accepted.iter().map(|accepted| effect(accepted.evaluation.suspect)).collect();
     // Forms of one effect that cannot be told apart are one finding.
     let pairs = found
-        .taken
+        .accepted
         .iter()
-        .flat_map(|taken| taken.alternatives.iter().map(|other| (*other, taken.evaluation.suspect)));
+        .flat_map(|accepted| accepted.alternatives.iter().map(|other| (*other, accepted.evaluation.suspect)));
     let others: Vec<usize> =
         pairs.filter(|(other, of)| effect(*other) != effect(*of)).map(|(one, _)| one).collect();
-    let is_near_another = found
-        .taken
-        .iter()
-        .any(|taken| taken.near.iter().any(|other| !is_one_effect(model, *other, taken.evaluation.suspect)));
+    let is_near_another = found.accepted.iter().any(|accepted| {
+        accepted.near.iter().any(|other| !is_one_effect(model, *other, accepted.evaluation.suspect))
+    });
     let verdict = match () {
         () if found.decoy.is_some() => Verdict::OutsideCatalogue,
         () if !others.is_empty() || is_near_another => Verdict::Ambiguous,
-        () if found.taken.is_empty() => Verdict::NothingMissing,
+        () if found.accepted.is_empty() => Verdict::NothingMissing,
         () => Verdict::Named,
     };
-    let named: Vec<Named> = found
-        .taken
+    let named: Vec<NamedSuspect> = found
+        .accepted
         .iter()
-        .map(|taken| Named {
-            suspect: model.suspects[taken.evaluation.suspect].name.clone(),
-            effect: model.suspects[taken.evaluation.suspect].effect.clone(),
-            place: place(model, taken.evaluation.suspect),
-            term: term(model, taken.evaluation.suspect),
-            share_explained: taken.evaluation.share,
-            alternatives: taken
+        .map(|accepted| NamedSuspect {
+            suspect: model.suspects[accepted.evaluation.suspect].name.clone(),
+            effect: model.suspects[accepted.evaluation.suspect].effect.clone(),
+            place: place(model, accepted.evaluation.suspect),
+            term: term(model, accepted.evaluation.suspect),
+            share_explained: accepted.evaluation.share,
+            alternatives: accepted
                 .alternatives
                 .iter()
-                .chain(&taken.near)
+                .chain(&accepted.near)
                 .map(|other| model.suspects[*other].name.clone())
                 .collect(),
         })
@@ -219,19 +219,19 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
     let either = |all: &[usize]| {
         all.iter().map(|one| model.suspects[*one].name.as_str()).collect::<Vec<_>>().join(" or ")
     };
-    let name = |taken: &Taken| model.suspects[taken.evaluation.suspect].name.as_str();
-    let forms = found.taken.iter().filter(|one| others.is_empty() && !one.alternatives.is_empty());
+    let name = |accepted: &AcceptedSuspect| model.suspects[accepted.evaluation.suspect].name.as_str();
+    let forms = found.accepted.iter().filter(|one| others.is_empty() && !one.alternatives.is_empty());
     let forms: String = forms
         .map(|one| {
             let others = either(&one.alternatives);
             format!(", in the form of {} or {others}: the records cannot tell", name(one))
         })
         .collect();
-    let near = found.taken.iter().filter(|one| !one.near.is_empty());
+    let near = found.accepted.iter().filter(|one| !one.near.is_empty());
     let near: String =
         near.map(|one| format!("; {} cannot be told from {}", name(one), either(&one.near))).collect();
     let headline = headline + &forms + &near;
-    let mut suspects: Vec<Judgement> =
+    let mut suspects: Vec<SuspectJudgement> =
         found.first.iter().map(|evaluation| judgement(fitting, evaluation, found)).collect();
     suspects.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(b.gain.total_cmp(&a.gain)));
     let mut notes = look::beyond_reach(&found.baseline);
@@ -247,11 +247,17 @@ pub(crate) fn report(file: &Path, found: &Found<'_>, structure: &Structure) -> M
         let doubt = fitted.convergence.doubt().filter(|_| fitted.convergence.outcome != Outcome::Bound);
         notes.extend(doubt.map(|doubt| format!("{name}: {doubt}")));
     }
-    let parameters = numbers(&found.extended, &found.baseline, !found.taken.is_empty());
+    let parameters = numbers(&found.extended, &found.baseline, !found.accepted.is_empty());
     notes.extend(bounds::remarks(&parameters));
     let [before, after] = [found.baseline.rms_si(), found.extended.rms_si()];
     let training = (0..model.outputs.len()).map(|output| {
-        left(model, "training", output, [before[output], after[output]], fitting.count(output) as usize)
+        comparison_of(
+            model,
+            "training",
+            output,
+            [before[output], after[output]],
+            fitting.count(output) as usize,
+        )
     });
     ModelReport {
         schema_version: SCHEMA_VERSION,
@@ -277,30 +283,31 @@ impl ModelReport {
     pub(crate) fn judge(
         &mut self,
         model: &Model,
-        (judged, alternatives): (&[Judged], &[Alternative]),
+        (judged, alternatives): (&[HeldOutResidual], &[Alternative]),
         traces: &[Traces],
     ) {
         let name = |suspect: usize| model.suspects[suspect].name.clone();
-        let left =
-            |one: &Judged| left(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows);
+        let comparison = |one: &HeldOutResidual| {
+            comparison_of(model, &traces[one.record].record, one.output, one.rms_si, one.scored_rows)
+        };
         let of_alternative = |alternative: &Alternative| {
             let [suspect, instead_of] = [alternative.suspect, alternative.instead_of].map(name);
-            let of = |one: &Judged| {
+            let of = |one: &HeldOutResidual| {
                 let (suspect, instead_of) = (suspect.clone(), instead_of.clone());
-                OfAlternative { suspect, instead_of, left: left(one) }
+                AlternativeResidual { suspect, instead_of, residual: comparison(one) }
             };
             alternative.judged.iter().map(of).collect::<Vec<_>>()
         };
         self.held_out_alternatives = alternatives.iter().flat_map(of_alternative).collect();
-        self.held_out = judged.iter().map(left).collect();
+        self.held_out = judged.iter().map(comparison).collect();
         if self.named.is_empty() && self.discovered.is_empty() {
             return;
         }
-        let worse: Vec<&Left> =
+        let worse: Vec<&ResidualComparison> =
             self.held_out.iter().filter(|left| left.rms_after > WORSE * left.rms_before).collect();
         let better = self.held_out.iter().any(|left| left.rms_after < left.rms_before / WORSE);
         self.confirmed = Some(better && worse.is_empty());
-        if let Some(Left { record, output, unit, rms_before, rms_after, .. }) = worse.first() {
+        if let Some(ResidualComparison { record, output, unit, rms_before, rms_after, .. }) = worse.first() {
             let [before, after] = [rms_before, rms_after].map(|rms| significant(*rms));
             self.headline = format!(
                 "{} taken back: on {record} {output} gets worse, {before} to {after} {unit} rms; \
@@ -334,8 +341,8 @@ impl ModelReport {
 }
 
 /// Notes of records, with their names.
-pub(super) fn notes_of(records: &[Measured]) -> Vec<String> {
-    let of = |record: &Measured| {
+pub(super) fn notes_of(records: &[MeasuredRecord]) -> Vec<String> {
+    let of = |record: &MeasuredRecord| {
         record.notes.iter().map(|note| format!("{}: {note}", record.name)).collect::<Vec<_>>()
     };
     records.iter().flat_map(of).collect()
@@ -345,12 +352,18 @@ pub(crate) fn significant(value: f64) -> String {
     pagekit::significant::short(value)
 }
 
-fn left(model: &Model, record: &str, output: usize, rms_si: [f64; 2], rows: usize) -> Left {
+fn comparison_of(
+    model: &Model,
+    record: &str,
+    output: usize,
+    rms_si: [f64; 2],
+    rows: usize,
+) -> ResidualComparison {
     let output = &model.outputs[output];
     let [rms_before, rms_after] = rms_si.map(|rms| rms / output.unit.factor);
     let ratio = (rms_before > 0.0).then(|| rms_after / rms_before);
     let (record, name, unit) = (record.to_owned(), output.name.clone(), output.unit.text.clone());
-    Left { record, output: name, unit, rms_before, rms_after, ratio, rows }
+    ResidualComparison { record, output: name, unit, rms_before, rms_after, ratio, rows }
 }
 
 /// What tells a model from another one: its equations and suspects, not its numbers.
@@ -405,20 +418,20 @@ pub(crate) fn term(model: &Model, suspect: usize) -> String {
 }
 
 /// Numbers of a fit, with their errors.
-pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) -> Vec<Number> {
+pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) -> Vec<ParameterEstimate> {
     let fitting = &fitted.fitting;
     let errors = covariance::errors(fitted, baseline, has_law);
     let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors);
     all.map(|((unknown, value), error)| {
         let unit = fitting.unit_of(unknown);
         let is_at_bound = bounds::is_at_bound(*value, unknown.range_si);
-        Number {
+        ParameterEstimate {
             name: fitting.name_of(unknown),
             suspect: fitting.suspect_of(unknown).map(|suspect| fitting.model.suspects[suspect].name.clone()),
             unit: unit.text.clone(),
             value: value / unit.factor,
             standard_error: error.filter(|_| !is_at_bound).map(|error| error.whole() / unit.factor),
-            baseline: covariance::before(baseline, unknown.what).map(|before| before / unit.factor),
+            baseline: covariance::before(baseline, unknown.kind).map(|before| before / unit.factor),
             is_at_bound,
             is_of_one_sign: unknown.range_si[0] >= 0.0 || unknown.range_si[1] <= 0.0,
             expected: unknown.prior_si.map(|prior| prior.map(|value| value / unit.factor)),
@@ -427,17 +440,18 @@ pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool)
     .collect()
 }
 
-fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) -> Judgement {
+fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &SearchResult<'_>) -> SuspectJudgement {
     let model = fitting.model;
     let suspect = &model.suspects[evaluation.suspect];
-    let taken = found.taken.iter().position(|taken| taken.evaluation.suspect == evaluation.suspect);
+    let accepted =
+        found.accepted.iter().position(|accepted| accepted.evaluation.suspect == evaluation.suspect);
     let last = found.last.iter().find(|last| last.suspect == evaluation.suspect);
-    let mut decision = match (taken, last) {
+    let mut decision = match (accepted, last) {
         (Some(round), _) => format!("taken, number {}", round + 1),
-        _ if found.taken.iter().any(|taken| taken.alternatives.contains(&evaluation.suspect)) => {
+        _ if found.accepted.iter().any(|accepted| accepted.alternatives.contains(&evaluation.suspect)) => {
             "explains the records as well as what was taken".to_owned()
         }
-        _ if found.taken.first().is_some_and(|taken| taken.near.contains(&evaluation.suspect)) => {
+        _ if found.accepted.first().is_some_and(|accepted| accepted.near.contains(&evaluation.suspect)) => {
             format!("cannot be told from what was taken, though it fails: {}", evaluation.gate)
         }
         (None, Some(last)) if last.passes => "passes, but another was better".to_owned(),
@@ -446,7 +460,7 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
     };
     let numbers = evaluation.values_si.iter().map(|(index, value)| {
         let parameter = &model.parameters[*index];
-        Number {
+        ParameterEstimate {
             name: parameter.name.clone(),
             suspect: Some(suspect.name.clone()),
             unit: parameter.unit.text.clone(),
@@ -458,7 +472,7 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
             expected: None,
         }
     });
-    let numbers: Vec<Number> = numbers.collect();
+    let numbers: Vec<ParameterEstimate> = numbers.collect();
     let at_end = numbers.iter().find(|number| number.is_at_bound);
     match (evaluation.convergence.outcome, at_end) {
         (Outcome::Bound, Some(number)) => {
@@ -470,7 +484,7 @@ fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &Found<'_>) 
         }
         _ => decision += &evaluation.convergence.doubt().map_or(String::new(), |doubt| format!("; {doubt}")),
     }
-    Judgement {
+    SuspectJudgement {
         suspect: suspect.name.clone(),
         place: place(model, evaluation.suspect),
         is_decoy: suspect.is_decoy,

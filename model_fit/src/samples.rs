@@ -1,13 +1,13 @@
 //! All measured samples of all records, row after row, each times the scale of its output: what was measured, what the model
 //! says, and its derivatives.
 
-use super::fit::{Fitting, OfRecord};
-use super::record::Measured;
+use super::fit::{Fitting, OutputSeries};
+use super::record::MeasuredRecord;
 use model::Failure;
 
 impl Fitting<'_> {
     /// What the model leaves, and what it says: record by record, output by output; NaN where nothing was measured.
-    pub(crate) fn residuals(&self, values_si: &[f64]) -> Result<Vec<OfRecord>, Failure> {
+    pub(crate) fn residuals(&self, values_si: &[f64]) -> Result<Vec<OutputSeries>, Failure> {
         let mut all = Vec::new();
         for (record, measured) in self.records.iter().enumerate() {
             let mut of_record =
@@ -26,7 +26,7 @@ impl Fitting<'_> {
 
     /// All measured samples that a model is held against, row after row, times the scale of their output.
     pub(crate) fn measured(&self, scale: &[f64]) -> Vec<f64> {
-        let of_record = |record: &Measured| -> Vec<f64> {
+        let of_record = |record: &MeasuredRecord| -> Vec<f64> {
             let row = |row: usize| {
                 let outputs = record.outputs.iter().zip(scale);
                 outputs.filter_map(move |(output, scale)| Some(scale * output[row]?)).collect::<Vec<f64>>()
@@ -48,7 +48,7 @@ impl Fitting<'_> {
     }
 
     /// What the model says of these.
-    pub(crate) fn said(&self, values_si: &[f64], scale: &[f64]) -> Result<Vec<f64>, Failure> {
+    pub(crate) fn predictions(&self, values_si: &[f64], scale: &[f64]) -> Result<Vec<f64>, Failure> {
         let mut values = Vec::new();
         for record in 0..self.records.len() {
             let measured = &self.records[record].outputs;

@@ -9,13 +9,13 @@
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
 use super::covariance;
-use super::fit::{Fitting, OPTIONS, OfRecord, Point};
+use super::fit::{Fitting, OPTIONS, OutputSeries, Point};
 use super::folds::{Folds, folds, refitted, steps};
-use super::judge::{Evaluation, SHARE_FLOOR, Sides, apart, is_one_effect, judge, most_share, weigh};
+use super::judge::{Evaluation, ReferenceFits, SHARE_FLOOR, apart, is_one_effect, judge, most_share, weigh};
 use super::normal::Normal;
 use super::pairs::{self, Pair};
-use super::progress::{Done, with_progress};
-use super::record::Measured;
+use super::progress::{ProgressCounter, with_progress};
+use super::record::MeasuredRecord;
 use super::starts;
 use crate::estimator::Convergence;
 use model::{Failure, Model, Program};
@@ -52,7 +52,7 @@ pub(crate) struct Fitted<'a> {
 }
 
 /// An accepted suspect with its alternatives.
-pub(crate) struct Taken {
+pub(crate) struct AcceptedSuspect {
     pub(crate) evaluation: Evaluation,
     /// Others that explain the records as well.
     pub(crate) alternatives: Vec<usize>,
@@ -60,7 +60,7 @@ pub(crate) struct Taken {
     pub(crate) near: Vec<usize>,
 }
 
-/// A suspect that could not be told from a taken one, fitted in its place.
+/// A suspect that cannot be distinguished from an accepted one, fitted in its place.
 pub(crate) struct Rival<'a> {
     pub(crate) suspect: usize,
     pub(crate) instead_of: usize,
@@ -69,12 +69,12 @@ pub(crate) struct Rival<'a> {
     pub(crate) fit: Result<Fitted<'a>, Failure>,
 }
 
-/// What came of the search.
-pub(crate) struct Found<'a> {
+/// Result of the forward selection.
+pub(crate) struct SearchResult<'a> {
     pub(crate) baseline: Fitted<'a>,
     pub(crate) extended: Fitted<'a>,
-    pub(crate) taken: Vec<Taken>,
-    /// All suspects beside the baseline alone, and beside what was taken.
+    pub(crate) accepted: Vec<AcceptedSuspect>,
+    /// Evaluations of all suspects in the first round and in the last one.
     pub(crate) first: Vec<Evaluation>,
     pub(crate) last: Vec<Evaluation>,
     /// Suspects that cannot be simulated, with the reason.
@@ -88,20 +88,20 @@ pub(crate) struct Found<'a> {
 /// Fits the model alone and searches beside it.
 pub(crate) fn search<'a>(
     model: &'a Model,
-    records: &'a [Measured],
+    records: &'a [MeasuredRecord],
     progress: &mut dyn FnMut(&str),
-) -> Result<Found<'a>, Failure> {
+) -> Result<SearchResult<'a>, Failure> {
     let baseline = with_progress(progress, ("the model alone: fits", 2), |done| {
         let first = fitted(model, records, &[], None)?;
-        done.one_more();
+        done.increment();
         // Once more from there: suspects are fitted from its values, and must gain nothing by that alone.
         fitted(model, records, &[], Some(&first))
     })?;
-    progress(&format!("the model alone: {}", left(&baseline)));
-    let mut found = Found {
+    progress(&format!("the model alone: {}", rms_in_words(&baseline)));
+    let mut found = SearchResult {
         extended: baseline.clone(),
         baseline,
-        taken: Vec::new(),
+        accepted: Vec::new(),
         first: Vec::new(),
         last: Vec::new(),
         failed: Vec::new(),
@@ -109,14 +109,14 @@ pub(crate) fn search<'a>(
         notes: Vec::new(),
     };
     while !found.is_over() {
-        let taken = found.extended.suspects.clone();
-        let is_open = |suspect: &usize| !taken.contains(suspect) && !model.suspects[*suspect].is_term;
+        let accepted = found.extended.suspects.clone();
+        let is_open = |suspect: &usize| !accepted.contains(suspect) && !model.suspects[*suspect].is_term;
         let open: Vec<usize> = (0..model.suspects.len()).filter(is_open).collect();
         let round = with_progress(progress, ("fits of suspects", open.len()), |done| {
             let with = |suspect: &usize| {
-                let suspects: Vec<usize> = taken.iter().copied().chain([*suspect]).collect();
+                let suspects: Vec<usize> = accepted.iter().copied().chain([*suspect]).collect();
                 let fit = fitted(model, records, &suspects, Some(&found.extended));
-                done.one_more();
+                done.increment();
                 (*suspect, fit)
             };
             open.par_iter().map(with).collect::<Vec<_>>()
@@ -128,7 +128,9 @@ pub(crate) fn search<'a>(
                     tried.push(suspect);
                     fits.push(fit);
                 }
-                Err(failure) if found.taken.is_empty() => found.failed.push((suspect, failure.to_string())),
+                Err(failure) if found.accepted.is_empty() => {
+                    found.failed.push((suspect, failure.to_string()))
+                }
                 Err(_) => {}
             }
         }
@@ -137,23 +139,23 @@ pub(crate) fn search<'a>(
         let effective = least.map_or(Vec::new(), |least| least.effective.clone());
         let pairs = tried.iter().zip(&fits);
         let mut round: Vec<Evaluation> = pairs
-            .map(|(suspect, fit)| judge(found.sides(), fit, *suspect, (open.len(), &effective)))
+            .map(|(suspect, fit)| judge(found.reference_fits(), fit, *suspect, (open.len(), &effective)))
             .collect();
         weigh(&mut round);
-        if found.taken.is_empty() {
+        if found.accepted.is_empty() {
             found.first.clone_from(&round);
         }
         found.last.clone_from(&round);
         let passing = (0..round.len()).filter(|place| round[*place].passes);
         let value = |place: usize| round[place].worth();
         let best = passing.clone().max_by(|a, b| value(*a).total_cmp(&value(*b)));
-        if best.is_none() && found.taken.is_empty() {
+        if best.is_none() && found.accepted.is_empty() {
             let alone: Vec<(usize, Fitted<'a>)> = tried.into_iter().zip(fits).collect();
             let pair = with_progress(progress, ("fits of pairs", pairs::FITTED), |done| {
                 pairs::best(&found, &alone, done)
             });
             match pair {
-                Ok(pair) => found.take_pair(pair, progress),
+                Ok(pair) => found.accept_pair(pair, progress),
                 Err(why) => {
                     found.notes.extend(why);
                     return Ok(found);
@@ -185,63 +187,63 @@ pub(crate) fn search<'a>(
             [alternatives, near].map(|all| all.iter().map(|one| one.suspect).collect());
         found.extended = fits.swap_remove(best);
         let name = &model.suspects[evaluation.suspect].name;
-        progress(&format!("with {name}: {}", left(&found.extended)));
-        found.taken.push(Taken { evaluation, alternatives, near });
+        progress(&format!("with {name}: {}", rms_in_words(&found.extended)));
+        found.accepted.push(AcceptedSuspect { evaluation, alternatives, near });
     }
     Ok(found)
 }
 
-impl<'a> Found<'a> {
-    pub(super) fn sides(&self) -> Sides<'_, 'a> {
-        Sides { baseline: &self.baseline, before: &self.extended }
+impl<'a> SearchResult<'a> {
+    pub(super) fn reference_fits(&self) -> ReferenceFits<'_, 'a> {
+        ReferenceFits { baseline: &self.baseline, before: &self.extended }
     }
 
     /// Whether nothing more can be taken: what is left is less than a term must explain.
     fn is_over(&self) -> bool {
-        let is_little = || most_share(self.sides()) <= SHARE_FLOOR;
-        self.taken.len() >= MOST_TERMS || !self.taken.is_empty() && is_little()
+        let is_little = || most_share(self.reference_fits()) <= SHARE_FLOOR;
+        self.accepted.len() >= MOST_TERMS || !self.accepted.is_empty() && is_little()
     }
 
     /// Fits each suspect that could not be told from what was taken in its place, beside what else was taken.
     pub(crate) fn rivals(&self, progress: &mut dyn FnMut(&str)) -> Vec<Rival<'a>> {
-        let in_place = |(suspect, instead_of, is_near): (usize, usize, bool), done: &Done| {
+        let in_place = |(suspect, instead_of, is_near): (usize, usize, bool), done: &ProgressCounter| {
             let others = self.extended.suspects.iter().copied();
             let others = others.filter(|other| *other != instead_of && *other != suspect);
             let suspects: Vec<usize> = others.chain([suspect]).collect();
             let (model, records) = (self.extended.fitting.model, self.extended.fitting.records);
             let fit = fitted(model, records, &suspects, Some(&self.extended));
-            done.one_more();
+            done.increment();
             Rival { suspect, instead_of, is_near, fit }
         };
-        let of = |taken: &Taken| {
-            let instead_of = taken.evaluation.suspect;
-            let as_good = taken.alternatives.iter().map(move |suspect| (*suspect, instead_of, false));
-            let near = taken.near.iter().map(move |suspect| (*suspect, instead_of, true));
+        let of = |accepted: &AcceptedSuspect| {
+            let instead_of = accepted.evaluation.suspect;
+            let as_good = accepted.alternatives.iter().map(move |suspect| (*suspect, instead_of, false));
+            let near = accepted.near.iter().map(move |suspect| (*suspect, instead_of, true));
             as_good.chain(near).collect::<Vec<_>>()
         };
-        let all: Vec<_> = self.taken.iter().flat_map(of).collect();
+        let all: Vec<_> = self.accepted.iter().flat_map(of).collect();
         with_progress(progress, ("fits in place of what was named", all.len()), |done| {
             all.into_par_iter().map(|one| in_place(one, done)).collect()
         })
     }
 
-    fn take_pair(&mut self, pair: Pair<'a>, progress: &mut dyn FnMut(&str)) {
+    fn accept_pair(&mut self, pair: Pair<'a>, progress: &mut dyn FnMut(&str)) {
         let model = self.baseline.fitting.model;
         let [one, other] = [0, 1].map(|place| &model.suspects[pair.members[place].0.suspect].name);
         self.notes.push(format!("{one} and {other} were found together: neither passes alone"));
         self.extended = pair.fit;
-        progress(&format!("with {one} and {other}: {}", left(&self.extended)));
-        let taken = pair.members.map(|(evaluation, alternatives)| Taken {
+        progress(&format!("with {one} and {other}: {}", rms_in_words(&self.extended)));
+        let accepted = pair.members.map(|(evaluation, alternatives)| AcceptedSuspect {
             evaluation,
             alternatives,
             near: Vec::new(),
         });
-        self.taken.extend(taken);
+        self.accepted.extend(accepted);
     }
 }
 
-/// What a fit leaves, in words.
-fn left(fitted: &Fitted<'_>) -> String {
+/// Rms residual of each output, in words.
+fn rms_in_words(fitted: &Fitted<'_>) -> String {
     let model = fitted.fitting.model;
     let each = model.outputs.iter().zip(fitted.rms_si()).map(|(output, rms_si)| {
         format!("{} {:.4} {} rms", output.name, rms_si / output.unit.factor, output.unit.text)
@@ -266,7 +268,7 @@ impl Fitted<'_> {
 /// Fits a model with suspects, from what a smaller one gave and each start of the suspects that are new.
 pub(crate) fn fitted<'a>(
     model: &'a Model,
-    records: &'a [Measured],
+    records: &'a [MeasuredRecord],
     suspects: &[usize],
     from: Option<&Fitted<'a>>,
 ) -> Result<Fitted<'a>, Failure> {
@@ -279,7 +281,7 @@ pub(crate) fn fitted<'a>(
 /// The same from given starts, in at most so many steps.
 pub(crate) fn fitted_from<'a>(
     model: &'a Model,
-    records: &'a [Measured],
+    records: &'a [MeasuredRecord],
     suspects: &[usize],
     (starts, most): (impl Fn(&Fitting<'a>) -> Vec<Vec<f64>>, usize),
 ) -> Result<Fitted<'a>, Failure> {
@@ -288,10 +290,10 @@ pub(crate) fn fitted_from<'a>(
     let fitting = Fitting::new(model, program, records, suspects);
     let starts = starts(&fitting);
     let (point, convergence) = fitting.fit_from(starts, most)?;
-    let normals = fitting.normals(&point.values_si, &fitting.in_time())?;
+    let normals = fitting.normals(&point.values_si, &fitting.blocks_in_time())?;
     let normal = fitting.sum(&normals, &point);
     let bands = (0..model.rows.folds.len()).map(|fold| {
-        let normals = fitting.normals(&point.values_si, &fitting.in_bands(fold))?;
+        let normals = fitting.normals(&point.values_si, &fitting.blocks_in_bands(fold))?;
         Ok(folds(&normals, &steps(&normals, &normal, &fitting, &point)))
     });
     let bands = bands.collect::<Result<Vec<_>, Failure>>()?;
@@ -329,8 +331,9 @@ pub(super) fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>
 fn series(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<Vec<Vec<f64>>>, Failure> {
     let residuals = fitting.residuals(&point.values_si)?;
     let of_output = |output: usize| {
-        let measured =
-            |record: &OfRecord| record[output][0].iter().copied().filter(|value| value.is_finite()).collect();
+        let measured = |record: &OutputSeries| {
+            record[output][0].iter().copied().filter(|value| value.is_finite()).collect()
+        };
         residuals.iter().map(measured).collect()
     };
     Ok((0..fitting.model.outputs.len()).map(of_output).collect())

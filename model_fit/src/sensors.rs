@@ -5,9 +5,9 @@
 //! those of the model at its fit, so that nothing is fitted.
 
 use super::fit::Fitting;
-use super::record::Measured;
+use super::record::MeasuredRecord;
 use super::select::Fitted;
-use super::structure::{Advice, Base, Seen, TWINS, WeakSensor, cosine};
+use super::structure::{Advice, ReferenceModel, SuspectResponse, TWINS, WeakSensor, cosine};
 use crate::stats::mean_and_variance;
 use model::{Model, Part, Program};
 
@@ -44,16 +44,18 @@ pub(super) fn advice(
         })
         .collect();
     for state in unmeasured {
-        let Some(seen) = with_sensor((baseline, values_si), scale, state, confused) else { continue };
+        let Some(responses) = with_sensor((baseline, values_si), scale, state, confused) else { continue };
         for (suspects, advice) in confused.iter().zip(&mut advice) {
             let state = model.states[state].name.clone();
-            match with(&seen, suspects) {
-                Some(Shown { share, cosine })
+            match identifiability(&responses, suspects) {
+                Some(Identifiability { share, cosine })
                     if share > SHOWN && cosine.is_none_or(|cosine| cosine < APART) =>
                 {
                     advice.measure.push(state);
                 }
-                Some(Shown { share, cosine }) => advice.hardly.push(WeakSensor { state, share, cosine }),
+                Some(Identifiability { share, cosine }) => {
+                    advice.hardly.push(WeakSensor { state, share, cosine })
+                }
                 None => {}
             }
         }
@@ -61,19 +63,19 @@ pub(super) fn advice(
     advice
 }
 
-/// The least share that is seen of suspects, and the cosine of two.
-struct Shown {
+/// How well a sensor identifies suspects: the least share of their responses, and the cosine of two.
+struct Identifiability {
     share: f64,
     cosine: Option<f64>,
 }
 
-/// What a sensor shows of these; `None` where one of them stays hidden, or two stay twins.
-fn with(seen: &[Seen], suspects: &[usize]) -> Option<Shown> {
-    let of = |suspect: &usize| seen.iter().find(|one| one.suspect == *suspect && !one.is_hidden());
-    let all: Vec<&Seen> = suspects.iter().map(of).collect::<Option<_>>()?;
+/// Identifiability of these suspects with a sensor; `None` where one of them stays hidden, or two stay twins.
+fn identifiability(responses: &[SuspectResponse], suspects: &[usize]) -> Option<Identifiability> {
+    let of = |suspect: &usize| responses.iter().find(|one| one.suspect == *suspect && !one.is_hidden());
+    let all: Vec<&SuspectResponse> = suspects.iter().map(of).collect::<Option<_>>()?;
     let share = all.iter().map(|one| one.share).fold(f64::INFINITY, f64::min);
     let cosine = (all.len() == 2).then(|| cosine(all[0], all[1]));
-    cosine.is_none_or(|cosine| cosine <= TWINS).then_some(Shown { share, cosine })
+    cosine.is_none_or(|cosine| cosine <= TWINS).then_some(Identifiability { share, cosine })
 }
 
 /// What the suspects in question do to the outputs and to a state; `None` where it cannot be computed, or the state rests.
@@ -82,15 +84,15 @@ fn with_sensor(
     scale: &[f64],
     state: usize,
     confused: &[Vec<usize>],
-) -> Option<Vec<Seen>> {
+) -> Option<Vec<SuspectResponse>> {
     let measuring: Model = baseline.fitting.model.measuring(Part::State(state))?;
-    let records: Vec<Measured> = baseline.fitting.records.iter().map(with_one_more).collect();
-    let taken = &baseline.suspects;
-    let program = Program::new(&measuring, taken).ok()?;
-    let fitting = Fitting::new(&measuring, program, &records, taken);
-    let said = fitting.residuals(values_si).ok()?;
+    let records: Vec<MeasuredRecord> = baseline.fitting.records.iter().map(with_extra_output).collect();
+    let accepted = &baseline.suspects;
+    let program = Program::new(&measuring, accepted).ok()?;
+    let fitting = Fitting::new(&measuring, program, &records, accepted);
+    let predicted = fitting.residuals(values_si).ok()?;
     let state: Vec<f64> =
-        said.into_iter().filter_map(|mut record| record.pop()).flat_map(|[_, x]| x).collect();
+        predicted.into_iter().filter_map(|mut record| record.pop()).flat_map(|[_, x]| x).collect();
     let (mean, variance) = mean_and_variance(&state);
     if variance.is_nan() || variance <= RESTS * mean * mean {
         return None;
@@ -100,8 +102,8 @@ fn with_sensor(
     let mut asked: Vec<usize> = confused.iter().flatten().copied().collect();
     asked.sort_unstable();
     asked.dedup();
-    let base = Base { fitting: &fitting, taken, values_si, scale: &scale };
-    base.seen(&asked).ok().map(|(seen, ..)| seen)
+    let base = ReferenceModel { fitting: &fitting, accepted, values_si, scale: &scale };
+    base.responses(&asked).ok().map(|(responses, ..)| responses)
 }
 
 /// The least that is left of an output over its variation.
@@ -115,17 +117,23 @@ fn least_noise(baseline: &Fitted<'_>, scale: &[f64]) -> f64 {
 }
 
 /// A part of a fitted model at the rows of its records, SI; `None` where it cannot be computed.
-pub(super) fn said(fitted: &Fitted<'_>, part: Part) -> Option<Vec<f64>> {
+pub(super) fn part_values(fitted: &Fitted<'_>, part: Part) -> Option<Vec<f64>> {
     let measuring = fitted.fitting.model.measuring(part)?;
-    let records: Vec<Measured> = fitted.fitting.records.iter().map(with_one_more).collect();
+    let records: Vec<MeasuredRecord> = fitted.fitting.records.iter().map(with_extra_output).collect();
     let program = Program::new(&measuring, &fitted.suspects).ok()?;
     let fitting = Fitting::new(&measuring, program, &records, &fitted.suspects);
-    let said = fitting.residuals(&fitted.point.values_si).ok()?;
-    Some(said.into_iter().filter_map(|mut record| record.pop()).flat_map(|[_, said]| said).collect())
+    let predicted = fitting.residuals(&fitted.point.values_si).ok()?;
+    Some(
+        predicted
+            .into_iter()
+            .filter_map(|mut record| record.pop())
+            .flat_map(|[_, predicted]| predicted)
+            .collect(),
+    )
 }
 
 /// A record with a further output, measured at each row.
-pub(super) fn with_one_more(record: &Measured) -> Measured {
+pub(super) fn with_extra_output(record: &MeasuredRecord) -> MeasuredRecord {
     let mut record = record.clone();
     record.outputs.push(vec![Some(0.0); record.time_s.len()]);
     record

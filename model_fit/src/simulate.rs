@@ -3,16 +3,16 @@
 //! The table has the columns of the record that the model reads, in their units, and what the model says beside each output.
 
 use super::fit::Fitting;
-use super::record::Measured;
+use super::record::MeasuredRecord;
 use super::stats::mean_and_variance;
 use super::{ModelError, look, read};
 use model::{Model, Program, Start};
 use std::fmt::Write as _;
 use std::path::Path;
 
-/// What a model says of a record.
+/// Predictions of a model for a record.
 #[derive(Clone, Debug)]
-pub struct Simulated {
+pub struct SimulatedRecord {
     /// A row for each compared sample, separated by commas.
     pub table: String,
     pub outputs: Vec<SimulatedOutput>,
@@ -35,15 +35,15 @@ pub struct SimulatedOutput {
 ///
 /// # Errors
 /// [`ModelError`] for a model or a record that cannot be used, and for values at which the model cannot be simulated.
-pub fn simulate(file: &Path, record: &Path) -> Result<Simulated, ModelError> {
+pub fn simulate(file: &Path, record: &Path) -> Result<SimulatedRecord, ModelError> {
     let model = read(file)?;
-    let mut records = [Measured::read(&model, record)?];
+    let mut records = [MeasuredRecord::read(&model, record)?];
     look::beside_model(&model, &mut records);
     let program = Program::new(&model, &[])?;
     let fitting = Fitting::new(&model, program, &records, &[]);
-    let said = fitting.residuals(&fitting.start())?.pop().expect("one record");
+    let predicted = fitting.residuals(&fitting.start())?.pop().expect("one record");
     let record = &records[0];
-    let outputs = model.outputs.iter().zip(&said).map(|(output, [left, _])| {
+    let outputs = model.outputs.iter().zip(&predicted).map(|(output, [left, _])| {
         let left: Vec<f64> = left.iter().copied().filter(|left| !left.is_nan()).collect();
         let squares: f64 = left.iter().map(|left| left * left).sum();
         let place =
@@ -57,10 +57,10 @@ pub fn simulate(file: &Path, record: &Path) -> Result<Simulated, ModelError> {
         }
     });
     let outputs = outputs.collect();
-    let said: Vec<&Vec<f64>> = said.iter().map(|[_, said]| said).collect();
+    let predicted: Vec<&Vec<f64>> = predicted.iter().map(|[_, predicted]| predicted).collect();
     let mut notes = record.notes.clone();
     notes.extend(open(&model));
-    Ok(Simulated { table: table(&model, record, &said), outputs, notes })
+    Ok(SimulatedRecord { table: table(&model, record, &predicted), outputs, notes })
 }
 
 /// What a fit would find: said, since the simulation takes the first value.
@@ -73,7 +73,7 @@ fn open(model: &Model) -> Option<String> {
 }
 
 /// The columns: the time, inputs, and each output as it was measured and as the model says.
-fn table(model: &Model, record: &Measured, said: &[&Vec<f64>]) -> String {
+fn table(model: &Model, record: &MeasuredRecord, predicted: &[&Vec<f64>]) -> String {
     let layout = &model.record;
     let time = if layout.is_calendar { "t_s" } else { layout.time_column.as_str() };
     let mut head: Vec<String> = vec![time.to_owned()];
@@ -92,11 +92,11 @@ fn table(model: &Model, record: &Measured, said: &[&Vec<f64>]) -> String {
         let values = record.rows.iter().map(|row| Some(samples[*row] / factor));
         add(input.column.clone(), values.collect());
     }
-    for ((output, measured), said) in model.outputs.iter().zip(&record.outputs).zip(said) {
+    for ((output, measured), predicted) in model.outputs.iter().zip(&record.outputs).zip(predicted) {
         let factor = output.unit.factor * output.scale;
         add(output.column.clone(), measured.iter().map(|value| value.map(|value| value / factor)).collect());
-        let said = said.iter().map(|value| Some(value / factor).filter(|value| value.is_finite()));
-        add(format!("{}_model", output.name), said.collect());
+        let predicted = predicted.iter().map(|value| Some(value / factor).filter(|value| value.is_finite()));
+        add(format!("{}_model", output.name), predicted.collect());
     }
     let quoted = |name: &String| match name.contains([',', '"', '\n']) {
         true => format!("\"{}\"", name.replace('"', "\"\"")),

@@ -18,9 +18,9 @@
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
 
-use super::fit::{Fitting, OPTIONS, Point, What};
+use super::fit::{Fitting, OPTIONS, Point, UnknownKind};
 use crate::estimator::{Convergence, Outcome};
-use crate::structure::Beside;
+use crate::structure::LinearisedFit;
 use model::Failure;
 use nalgebra::DVector;
 
@@ -80,10 +80,10 @@ pub(super) fn of_newest(
 
 /// First values of a suspect's numbers, all other numbers as in the smaller fit.
 fn beside(fitting: &Fitting<'_>, (smaller, point): (&Fitting<'_>, &Point)) -> Vec<f64> {
-    let known = |what: What| smaller.unknowns.iter().position(|unknown| unknown.what == what);
+    let known = |kind: UnknownKind| smaller.unknowns.iter().position(|unknown| unknown.kind == kind);
     let value = |place: usize| point.values_si[place];
     let unknowns = fitting.unknowns.iter();
-    unknowns.map(|unknown| known(unknown.what).map_or(unknown.start_si, value)).collect()
+    unknowns.map(|unknown| known(unknown.kind).map_or(unknown.start_si, value)).collect()
 }
 
 fn of_newest_from(fitting: &Fitting<'_>, suspects: &[usize], first: &[f64]) -> Vec<Vec<f64>> {
@@ -100,13 +100,13 @@ fn promising(
     from: Option<(&Fitting<'_>, &Point)>,
 ) -> Vec<Vec<f64>> {
     let Some((smaller, point)) = from.filter(|_| starts.len() > PROMISING + 1) else { return starts };
-    let Some(beside) = Beside::new(smaller, point) else { return starts };
+    let Some(beside) = LinearisedFit::new(smaller, point) else { return starts };
     let mut starts = starts.into_iter();
     let mut all: Vec<Vec<f64>> = starts.next().into_iter().collect();
     let fall = |values: Vec<f64>| {
-        let said = fitting.said(&values, &beside.scale).ok()?;
-        let change = beside.rest(DVector::from_vec(said) - &beside.said);
-        let (size, gain) = (change.norm_squared(), change.dot(&beside.left));
+        let predicted = fitting.predictions(&values, &beside.scale).ok()?;
+        let change = beside.project_off(DVector::from_vec(predicted) - &beside.predictions);
+        let (size, gain) = (change.norm_squared(), change.dot(&beside.residual));
         let fall = if gain > 0.0 { gain * gain / size } else { 0.0 };
         (size > 0.0 && fall.is_finite()).then(|| (fall, change / size.sqrt(), values))
     };
@@ -241,8 +241,8 @@ fn values_of_newest(fitting: &Fitting<'_>, suspects: &[usize], first: Vec<f64>) 
     {
         let others = parameter.values_si[1..].iter().flat_map(|value| {
             all.iter().map(|start| {
-                let moved = fitting.unknowns.iter().zip(start).map(|(unknown, before)| match unknown.what {
-                    What::Shared(of) | What::OfRecord(of, _) if of == index => *value,
+                let moved = fitting.unknowns.iter().zip(start).map(|(unknown, before)| match unknown.kind {
+                    UnknownKind::Shared(of) | UnknownKind::PerRecord(of, _) if of == index => *value,
                     _ => *before,
                 });
                 moved.collect()

@@ -18,7 +18,7 @@
 //!
 //! Source: discrepancy-notes.md, 3; Brun, Reichert, Künsch 2001, Water Resources Research 37(4) (collinearity).
 
-use super::fit::{Fitting, Point, Unknown, What};
+use super::fit::{Fitting, Point, Unknown, UnknownKind};
 use super::judge::GAIN_APART;
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
@@ -109,18 +109,19 @@ pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     let scale = scale(fitting, point);
     let is_asked = |suspect: &model::Suspect| !suspect.is_decoy && !suspect.is_term;
     let asked: Vec<usize> = (0..model.suspects.len()).filter(|one| is_asked(&model.suspects[*one])).collect();
-    let base = Base { fitting, taken: &baseline.suspects, values_si: &point.values_si, scale: &scale };
-    let Ok((seen, base, moved)) = base.seen(&asked) else {
+    let base =
+        ReferenceModel { fitting, accepted: &baseline.suspects, values_si: &point.values_si, scale: &scale };
+    let Ok((responses, base, moved)) = base.responses(&asked) else {
         return Structure { undetermined, ..Structure::default() };
     };
     let name = |suspect: usize| model.suspects[suspect].name.clone();
     let idle = fitting.unknowns.iter().zip(&moved).filter(|(_, moved)| **moved == 0.0);
     let numbers = idle.map(|(unknown, _)| fitting.name_of(unknown));
-    let suspects = seen.iter().filter(|one| one.change == 0.0).map(|one| name(one.suspect));
+    let suspects = responses.iter().filter(|one| one.change == 0.0).map(|one| name(one.suspect));
     let without_effect = numbers.chain(suspects).collect();
-    let hidden: Vec<usize> = seen.iter().filter(|one| one.is_hidden()).map(|one| one.suspect).collect();
+    let hidden: Vec<usize> = responses.iter().filter(|one| one.is_hidden()).map(|one| one.suspect).collect();
     let left = DVector::from_vec(fitting.measured(&scale)) - base;
-    let cost = |one: &Seen, other: &Seen| {
+    let cost = |one: &SuspectResponse, other: &SuspectResponse| {
         let along = one.direction.dot(&left);
         let apart = (&one.direction - &other.direction * one.direction.dot(&other.direction)) * along;
         let mut squares = vec![0.0; scale.len()];
@@ -134,11 +135,11 @@ pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
         (along.abs(), (0..scale.len()).map(of_output).sum::<f64>())
     };
     // At the size of the one that explains more.
-    let predicted = |one: &Seen, other: &Seen| {
+    let predicted = |one: &SuspectResponse, other: &SuspectResponse| {
         let [first, second] = [cost(one, other), cost(other, one)];
         if first.0 >= second.0 { first.1 } else { second.1 }
     };
-    let twins = twins(&seen, predicted);
+    let twins = twins(&responses, predicted);
     let confused: Vec<Vec<usize>> =
         hidden.iter().map(|one| vec![*one]).chain(twins.iter().map(|(pair, _)| pair.to_vec())).collect();
     // A number that moves nothing measured stands where its fit happened to begin.
@@ -156,33 +157,36 @@ pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     }
 }
 
-/// What a suspect does to the outputs that the model's own numbers cannot do.
-pub(super) struct Seen {
+/// Change of the outputs by a suspect, projected off the sensitivities to the model's own numbers.
+pub(super) struct SuspectResponse {
     pub(super) suspect: usize,
-    /// Share of its change that is left, and its direction.
+    /// Share of the change that the projection leaves, and its direction.
     pub(super) share: f64,
     /// Size of its change, in units of what the model leaves.
     change: f64,
     direction: DVector<f64>,
 }
 
-impl Seen {
+impl SuspectResponse {
     pub(super) fn is_hidden(&self) -> bool {
         self.share <= HIDDEN
     }
 }
 
 /// Cosine of the projected responses of two suspects.
-pub(super) fn cosine(one: &Seen, other: &Seen) -> f64 {
+pub(super) fn cosine(one: &SuspectResponse, other: &SuspectResponse) -> f64 {
     one.direction.dot(&other.direction).abs()
 }
 
 /// Pairs that do the same, with their cosines; of suspects that are seen at all.
-fn twins(seen: &[Seen], predicted: impl Fn(&Seen, &Seen) -> f64) -> Vec<([usize; 2], f64)> {
-    let seen: Vec<&Seen> = seen.iter().filter(|one| !one.is_hidden()).collect();
+fn twins(
+    responses: &[SuspectResponse],
+    predicted: impl Fn(&SuspectResponse, &SuspectResponse) -> f64,
+) -> Vec<([usize; 2], f64)> {
+    let responses: Vec<&SuspectResponse> = responses.iter().filter(|one| !one.is_hidden()).collect();
     let mut twins = Vec::new();
-    for (place, one) in seen.iter().enumerate() {
-        for other in &seen[place + 1..] {
+    for (place, one) in responses.iter().enumerate() {
+        for other in &responses[place + 1..] {
             let cosine = cosine(one, other);
             if cosine > TWINS && predicted(one, other) < GAIN_APART {
                 twins.push(([one.suspect, other.suspect], cosine));
@@ -192,22 +196,21 @@ fn twins(seen: &[Seen], predicted: impl Fn(&Seen, &Seen) -> f64) -> Vec<([usize;
     twins
 }
 
-/// Suspects, what the model says, and how much each of its numbers moves that.
-type Sight = (Vec<Seen>, DVector<f64>, Vec<f64>);
+/// Responses of suspects, predictions of the model, and the norm of their sensitivity to each of its numbers.
+type SuspectResponses = (Vec<SuspectResponse>, DVector<f64>, Vec<f64>);
 
-/// A model with what was taken, beside which suspects are seen, and the scale of each output.
+/// The model at which responses of suspects are computed, with the suspects that it has, and the scale of each output.
 #[derive(Clone, Copy)]
-pub(super) struct Base<'a> {
+pub(super) struct ReferenceModel<'a> {
     pub(super) fitting: &'a Fitting<'a>,
-    pub(super) taken: &'a [usize],
+    pub(super) accepted: &'a [usize],
     pub(super) values_si: &'a [f64],
     pub(super) scale: &'a [f64],
 }
 
-impl<'a> Base<'a> {
-    /// What these suspects do, what the model says, and how much each of its numbers moves it; a suspect that cannot be simulated
-    /// is left out.
-    pub(super) fn seen(self, asked: &[usize]) -> Result<Sight, Failure> {
+impl<'a> ReferenceModel<'a> {
+    /// Responses of these suspects; one that cannot be simulated is left out.
+    pub(super) fn responses(self, asked: &[usize]) -> Result<SuspectResponses, Failure> {
         let (columns, base) = columns(self.fitting, self.values_si, self.scale)?;
         // Other steps of the integration move outputs, too, by no more than this.
         let least = match self.fitting.model.solver {
@@ -215,18 +218,18 @@ impl<'a> Base<'a> {
             Solver::Fixed { .. } => 0.0,
         };
         let of = |suspect: &usize| {
-            let change = self.changed(*suspect, &[]).ok()? - &base;
-            let seen = |change: DVector<f64>| {
+            let change = self.outputs_with(*suspect, &[]).ok()? - &base;
+            let response = |change: DVector<f64>| {
                 let (rest, size) = (&change - &columns * projected(&columns, &change), change.norm());
                 let share = if size > 0.0 { rest.norm() / size } else { 0.0 };
-                Seen { suspect: *suspect, share, change: size, direction: rest.normalize() }
+                SuspectResponse { suspect: *suspect, share, change: size, direction: rest.normalize() }
             };
             if change.norm() > least {
-                return Some(seen(change));
+                return Some(response(change));
             }
-            let begun = self.begun(*suspect).into_iter().map(seen);
-            let most = begun.max_by(|one, other| one.share.total_cmp(&other.share));
-            Some(most.unwrap_or_else(|| seen(change * 0.0)))
+            let slopes = self.slopes_at_zero(*suspect).into_iter().map(response);
+            let most = slopes.max_by(|one, other| one.share.total_cmp(&other.share));
+            Some(most.unwrap_or_else(|| response(change * 0.0)))
         };
         let all = asked.iter().filter_map(of).collect();
         let moved = columns.column_iter().map(|column| column.norm()).collect();
@@ -235,8 +238,8 @@ impl<'a> Base<'a> {
 
     /// What a suspect that does nothing at its first values does per unit of each of its numbers that starts at 0; of those alone
     /// that move an output.
-    fn begun(self, suspect: usize) -> Vec<DVector<f64>> {
-        let (extended, values_si) = self.beside(suspect, &[]);
+    fn slopes_at_zero(self, suspect: usize) -> Vec<DVector<f64>> {
+        let (extended, values_si) = self.with_suspect(suspect, &[]);
         let parameters = &self.fitting.model.parameters;
         let at_0 = |index: usize| {
             let Parameter { suspect: owner, values_si, is_fixed, .. } = &parameters[index];
@@ -248,10 +251,13 @@ impl<'a> Base<'a> {
         }
         let Ok((columns, _)) = columns(&extended, &values_si, self.scale) else { return Vec::new() };
         let of_number = |index: &usize| {
-            let is_it = |what: What| matches!(what, What::Shared(of) | What::OfRecord(of, _) if of == *index);
+            let is_it = |kind: UnknownKind| match kind {
+                UnknownKind::Shared(of) | UnknownKind::PerRecord(of, _) => of == *index,
+                UnknownKind::Start(..) => false,
+            };
             let of_number = extended.unknowns.iter().zip(columns.column_iter());
             of_number
-                .filter(|(unknown, _)| is_it(unknown.what))
+                .filter(|(unknown, _)| is_it(unknown.kind))
                 .map(|(_, column)| column)
                 .fold(DVector::zeros(columns.nrows()), |sum, column| sum + column)
         };
@@ -259,22 +265,26 @@ impl<'a> Base<'a> {
     }
 
     /// Scaled outputs with a suspect at these values, or its first; all other numbers as they are.
-    pub(super) fn changed(self, suspect: usize, of_suspect: &[(What, f64)]) -> Result<DVector<f64>, Failure> {
-        let (extended, values_si) = self.beside(suspect, of_suspect);
-        Ok(DVector::from_vec(extended.said(&values_si, self.scale)?))
+    pub(super) fn outputs_with(
+        self,
+        suspect: usize,
+        of_suspect: &[(UnknownKind, f64)],
+    ) -> Result<DVector<f64>, Failure> {
+        let (extended, values_si) = self.with_suspect(suspect, of_suspect);
+        Ok(DVector::from_vec(extended.predictions(&values_si, self.scale)?))
     }
 
     /// The fit with one suspect more, and its numbers.
-    fn beside(self, suspect: usize, of_suspect: &[(What, f64)]) -> (Fitting<'a>, Vec<f64>) {
-        let Base { fitting, taken, values_si, .. } = self;
-        let mut suspects = taken.to_vec();
+    fn with_suspect(self, suspect: usize, of_suspect: &[(UnknownKind, f64)]) -> (Fitting<'a>, Vec<f64>) {
+        let ReferenceModel { fitting, accepted, values_si, .. } = self;
+        let mut suspects = accepted.to_vec();
         suspects.push(suspect);
         let program = Program::new(fitting.model, &suspects).expect("all suspects together were compiled");
         let extended = Fitting::new(fitting.model, program, fitting.records, &suspects);
-        let known = |what| fitting.unknowns.iter().position(|unknown| unknown.what == what);
+        let known = |kind| fitting.unknowns.iter().position(|unknown| unknown.kind == kind);
         let value = |unknown: &Unknown| {
-            let of_it = of_suspect.iter().find(|(what, _)| *what == unknown.what).map(|(_, value)| *value);
-            of_it.or_else(|| known(unknown.what).map(|place| values_si[place])).unwrap_or(unknown.start_si)
+            let of_it = of_suspect.iter().find(|(kind, _)| *kind == unknown.kind).map(|(_, value)| *value);
+            of_it.or_else(|| known(unknown.kind).map(|place| values_si[place])).unwrap_or(unknown.start_si)
         };
         let values_si = extended.unknowns.iter().map(value).collect();
         (extended, values_si)
@@ -304,26 +314,26 @@ pub(super) fn columns(
     Ok((DMatrix::from_row_slice(rows, fitting.unknowns.len(), &slopes), DVector::from_vec(values)))
 }
 
-/// A fit that changes are held beside: all in units of what it leaves of each output, less what its own numbers can do.
-pub(super) struct Beside {
+/// A fit with its sensitivities, in units of the residual of each output; `residual` is projected off them.
+pub(super) struct LinearisedFit {
     pub(super) scale: Vec<f64>,
-    pub(super) said: DVector<f64>,
-    pub(super) left: DVector<f64>,
+    pub(super) predictions: DVector<f64>,
+    pub(super) residual: DVector<f64>,
     columns: DMatrix<f64>,
 }
 
-impl Beside {
+impl LinearisedFit {
     /// `None` where it cannot be simulated.
     pub(super) fn new(fitting: &Fitting<'_>, point: &Point) -> Option<Self> {
         let scale = scale(fitting, point);
-        let (columns, said) = columns(fitting, &point.values_si, &scale).ok()?;
-        let left = DVector::from_vec(fitting.measured(&scale)) - &said;
-        let beside = Self { scale, said, left: DVector::zeros(0), columns };
-        Some(Self { left: beside.rest(left), ..beside })
+        let (columns, predictions) = columns(fitting, &point.values_si, &scale).ok()?;
+        let residual = DVector::from_vec(fitting.measured(&scale)) - &predictions;
+        let beside = Self { scale, predictions, residual: DVector::zeros(0), columns };
+        Some(Self { residual: beside.project_off(residual), ..beside })
     }
 
-    /// A change less what the fit's own numbers can do for it.
-    pub(super) fn rest(&self, change: DVector<f64>) -> DVector<f64> {
+    /// A change, projected off the sensitivities to the fit's own numbers.
+    pub(super) fn project_off(&self, change: DVector<f64>) -> DVector<f64> {
         let taken = &self.columns * projected(&self.columns, &change);
         change - taken
     }

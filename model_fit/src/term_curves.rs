@@ -11,10 +11,10 @@
 
 use super::covariance::{self, NumberError};
 use super::fit::Fitting;
-use super::record::Measured;
+use super::record::MeasuredRecord;
 use super::report;
-use super::select::{Fitted, Found, Rival};
-use super::sensors::{said, with_one_more};
+use super::select::{Fitted, Rival, SearchResult};
+use super::sensors::{part_values, with_extra_output};
 use model::{Part, Program, Unit};
 use nalgebra::{DMatrix, DVector};
 
@@ -52,8 +52,8 @@ pub(crate) struct Bin {
 
 /// A curve for each suspect of the extended model, and for each that could not be told from one; none for one that rests, or
 /// that cannot be computed by itself.
-pub(crate) fn curves(found: &Found<'_>, rivals: &[Rival<'_>]) -> Vec<TermCurve> {
-    let has_law = !found.taken.is_empty();
+pub(crate) fn curves(found: &SearchResult<'_>, rivals: &[Rival<'_>]) -> Vec<TermCurve> {
+    let has_law = !found.accepted.is_empty();
     let mut curves = drawn((&found.extended, &found.baseline), (&found.extended.suspects, None), has_law);
     for rival in rivals {
         let Ok(fit) = &rival.fit else { continue };
@@ -82,11 +82,11 @@ fn drawn(
     let states = states.map(|(index, state)| (Part::State(index), &state.name, &state.unit));
     let variables: Vec<_> = inputs
         .chain(states)
-        .filter_map(|(part, name, unit)| Some((name, unit, said(fitted, part)?)))
+        .filter_map(|(part, name, unit)| Some((name, unit, part_values(fitted, part)?)))
         .collect();
     let errors = covariance::errors(fitted, baseline, has_law);
     let of = |suspect: &usize| {
-        let term = Along::of(fitted, *suspect, &errors)?;
+        let term = TermSeries::of(fitted, *suspect, &errors)?;
         let unit = &term.unit;
         let of_variable = |at: usize| {
             let (share, bins) = binned(&variables[at].2, &term.values)?;
@@ -114,7 +114,7 @@ fn drawn(
 }
 
 /// A term along the records, SI.
-struct Along {
+struct TermSeries {
     unit: Unit,
     values: Vec<f64>,
     /// Derivatives by its numbers, row by row.
@@ -122,11 +122,11 @@ struct Along {
     covariance: Option<DMatrix<f64>>,
 }
 
-impl Along {
+impl TermSeries {
     /// `None` for a term that cannot be computed by itself.
     fn of(fitted: &Fitted<'_>, suspect: usize, errors: &[Option<NumberError>]) -> Option<Self> {
         let measuring = fitted.fitting.model.measuring(Part::Suspect(suspect))?;
-        let records: Vec<Measured> = fitted.fitting.records.iter().map(with_one_more).collect();
+        let records: Vec<MeasuredRecord> = fitted.fitting.records.iter().map(with_extra_output).collect();
         let program = Program::new(&measuring, &fitted.suspects).ok()?.along_states(&measuring);
         let fitting = Fitting::new(&measuring, program, &records, &fitted.suspects);
         let is_own = |place: &usize| fitting.suspect_of(&fitting.unknowns[*place]) == Some(suspect);
@@ -273,7 +273,7 @@ parameters.b = { unit = "1/s", value = 0.01, range = [-10, 10] }
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), record()).unwrap();
         let model = Model::parse(MODEL, Path::new("m.toml")).unwrap();
-        let records = [Measured::read(&model, file.path()).unwrap()];
+        let records = [MeasuredRecord::read(&model, file.path()).unwrap()];
         let baseline = select::fitted(&model, &records, &[], None).unwrap();
         let fitted = select::fitted(&model, &records, &[suspect], Some(&baseline)).unwrap();
         let curve = drawn((&fitted, &baseline), (&[suspect], None), has_law).pop().unwrap();

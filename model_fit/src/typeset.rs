@@ -42,7 +42,7 @@ pub(crate) fn of_suspect(model: &Model, index: usize) -> String {
     } else {
         let (left, left_text) = page.left(target);
         let rest = || "<mo>…</mo>".to_owned();
-        let side = Side { whole: rest(), term: rest(), factor: rest(), text: "…".to_owned() };
+        let side = RightHandSide { whole: rest(), term: rest(), factor: rest(), text: "…".to_owned() };
         let side = page.changed(side, index);
         block(&left, "=", &side.whole, &format!("{left_text} = {}", side.text))
     };
@@ -59,8 +59,8 @@ struct Typeset<'a> {
     named: Vec<usize>,
 }
 
-/// An equation so far: by itself, as the first term of a sum, as the first factor of a product, and in plain text.
-struct Side {
+/// The right-hand side of an equation: by itself, as first term of a sum, as first factor of a product, and in plain text.
+struct RightHandSide {
     whole: String,
     term: String,
     factor: String,
@@ -75,7 +75,7 @@ impl Typeset<'_> {
     /// The equation of a place with what changes it, and behind it what stands by itself.
     fn equation(&self, owner: Option<usize>, target: Target, value: &Expression) -> String {
         let (left, left_text) = self.left(target);
-        let mut side = Side {
+        let mut side = RightHandSide {
             whole: self.marked(owner, self.set(value, Operand::None)),
             term: self.marked(owner, self.set(value, Operand::FirstTerm)),
             factor: self.marked(owner, self.set(value, Operand::FirstFactor)),
@@ -101,7 +101,7 @@ impl Typeset<'_> {
         self.model.changes_of(target, &self.named)
     }
 
-    fn changed(&self, side: Side, index: usize) -> Side {
+    fn changed(&self, side: RightHandSide, index: usize) -> RightHandSide {
         let suspect = &self.model.suspects[index];
         let set = |operand| self.marked(Some(index), self.set(&suspect.expression, operand));
         let text = &suspect.expression.text;
@@ -109,14 +109,14 @@ impl Typeset<'_> {
             Change::Add => {
                 let sum = format!("{}<mo>+</mo>{}", side.term, set(Operand::Term));
                 let text = format!("{} + ({text})", side.text);
-                Side { whole: sum.clone(), factor: in_brackets(&sum), term: sum, text }
+                RightHandSide { whole: sum.clone(), factor: in_brackets(&sum), term: sum, text }
             }
             Change::Multiply => {
                 let product = format!("{}<mo>⋅</mo>{}", side.factor, set(Operand::Factor));
                 let text = format!("({})*({text})", side.text);
-                Side { whole: product.clone(), term: product.clone(), factor: product, text }
+                RightHandSide { whole: product.clone(), term: product.clone(), factor: product, text }
             }
-            Change::Replace => Side {
+            Change::Replace => RightHandSide {
                 whole: set(Operand::None),
                 term: set(Operand::FirstTerm),
                 factor: set(Operand::FirstFactor),
@@ -136,7 +136,7 @@ impl Typeset<'_> {
     fn by_itself(&self, target: Target, index: usize) -> String {
         let name = self.model.target_name(target);
         let before = || mathml_name(name);
-        let side = Side { whole: before(), term: before(), factor: before(), text: name.to_owned() };
+        let side = RightHandSide { whole: before(), term: before(), factor: before(), text: name.to_owned() };
         let side = self.changed(side, index);
         block(&before(), "←", &side.whole, &format!("{name} ← {}", side.text))
     }

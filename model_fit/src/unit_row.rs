@@ -13,7 +13,7 @@ const FACTOR_TOLERANCE: f64 = 1e-9;
     "{file}:{line}: the row of units has {written} for column {column}, and the model file reads {read}: write \
      unit = \"{written}\" under [{table}], or mend the row"
 )]
-pub struct OtherUnit {
+pub struct UnitMismatch {
     file: String,
     line: u64,
     column: String,
@@ -24,7 +24,7 @@ pub struct OtherUnit {
 }
 
 /// A column as the model file reads it.
-struct Read<'a> {
+struct ModelColumn<'a> {
     column: &'a str,
     /// Table of the file that says so.
     table: String,
@@ -39,7 +39,7 @@ pub(super) fn compared(model: &Model, file: &str, row: &UnitRow) -> Result<Optio
     let of = |column, table, (unit, scale): (&Unit, f64)| {
         let scaled = if scale == 1.0 { String::new() } else { format!("{scale} ") };
         let words = format!("{scaled}{}", unit.text);
-        Read { column, table, dimension: unit.dimension, factor: unit.factor * scale, words }
+        ModelColumn { column, table, dimension: unit.dimension, factor: unit.factor * scale, words }
     };
     let inputs = model.inputs.iter().filter(|input| input.rate_of.is_none());
     let inputs = inputs.map(|one| of(&one.column, format!("inputs.{}", one.name), (&one.unit, one.scale)));
@@ -61,8 +61,8 @@ pub(super) fn compared(model: &Model, file: &str, row: &UnitRow) -> Result<Optio
         if unit.dimension != read.dimension || (unit.factor / read.factor - 1.0).abs() > FACTOR_TOLERANCE {
             let (file, line, column) = (file.to_owned(), row.line, read.column.to_owned());
             let (written, read, table) = (unit.text, read.words, read.table);
-            let other = OtherUnit { file, line, column, written, read, table };
-            return Err(RecordError::OtherUnit(Box::new(other)));
+            let other = UnitMismatch { file, line, column, written, read, table };
+            return Err(RecordError::UnitMismatch(Box::new(other)));
         }
     }
     Ok((!unread.is_empty()).then(|| {
@@ -75,7 +75,7 @@ pub(super) fn compared(model: &Model, file: &str, row: &UnitRow) -> Result<Optio
 
 #[cfg(test)]
 mod tests {
-    use crate::record::Measured;
+    use crate::record::MeasuredRecord;
     use model::Model;
     use std::path::Path;
 
@@ -86,7 +86,7 @@ mod tests {
         let rows: String = (0..9).map(|row| format!("{row},{},{}\n", row * row, row % 4)).collect();
         std::fs::write(file.path(), format!("t,u,y\n{units}\n{rows}")).unwrap();
         let model = Model::parse(model, Path::new("m.toml")).unwrap();
-        Measured::read(&model, file.path()).map(|read| read.notes).map_err(|error| error.to_string())
+        MeasuredRecord::read(&model, file.path()).map(|read| read.notes).map_err(|error| error.to_string())
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `close` of this crate, whose report is held against `docs/model-report.schema.json` in every test that closes a model, and
 //! what these tests share.
 
-use model_fit::{ClosedModel, ModelError, ModelReport, Number, Search};
+use model_fit::{ClosedModel, ModelError, ModelReport, ParameterEstimate, Search};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::fs;
@@ -31,7 +31,7 @@ pub(crate) fn closed(
     close_with(&model, (&[train], &[test]), search, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
 }
 
-pub(crate) fn number<'a>(report: &'a ModelReport, name: &str) -> &'a Number {
+pub(crate) fn number<'a>(report: &'a ModelReport, name: &str) -> &'a ParameterEstimate {
     let number = report.parameters.iter().find(|number| number.name == name);
     number.unwrap_or_else(|| panic!("{name}: {:#?}", report.parameters))
 }
@@ -66,16 +66,16 @@ pub(crate) fn close_with(
 fn against_schema(report: &Value) -> Vec<String> {
     let schema: Value = serde_json::from_str(include_str!("../../docs/model-report.schema.json")).unwrap();
     let mut wrong = Vec::new();
-    Against { whole: &schema, wrong: &mut wrong }.value(&schema, report, "$");
+    SchemaValidator { whole: &schema, wrong: &mut wrong }.value(&schema, report, "$");
     wrong
 }
 
-struct Against<'a> {
+struct SchemaValidator<'a> {
     whole: &'a Value,
     wrong: &'a mut Vec<String>,
 }
 
-impl Against<'_> {
+impl SchemaValidator<'_> {
     /// The keywords of JSON schema 2020-12 that the schema has.
     fn value(&mut self, schema: &Value, value: &Value, place: &str) {
         if let Some(name) = schema["$ref"].as_str() {

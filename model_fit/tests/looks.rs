@@ -1,7 +1,7 @@
 //! What is said of a record before a model file is fitted to it.
 
 use crate::closing::{close, file, random};
-use model_fit::{look, simulate};
+use model_fit::{preview_records, simulate};
 
 /// A tank that drains, a pump that fills it.
 const TANK: &str = r#"
@@ -47,7 +47,7 @@ fn notes(model: &str, rows: impl Iterator<Item = [f64; 3]>) -> String {
     let folder = tempfile::tempdir().unwrap();
     let model = file(folder.path(), "tank.toml", model);
     let record = file(folder.path(), "record.csv", &written(rows));
-    look(&model, &[record]).unwrap_or_else(|error| panic!("{error}"))[0].notes.join("\n")
+    preview_records(&model, &[record]).unwrap_or_else(|error| panic!("{error}"))[0].notes.join("\n")
 }
 
 #[test]
@@ -177,7 +177,7 @@ fn a_condition_that_few_rows_meet_is_said_with_what_it_reads() {
     let record = file(folder.path(), "record.csv", &format!("t_s,pump_V,level_V\n{rows}"));
     let why = |rows: &str| {
         let model = file(folder.path(), "tank.toml", &format!("{rows}\n{TANK}"));
-        look(&model, std::slice::from_ref(&record)).unwrap_err().to_string()
+        preview_records(&model, std::slice::from_ref(&record)).unwrap_err().to_string()
     };
     let said = why("rows.where = \"pump > 50[V]\"");
     assert!(

@@ -6,7 +6,7 @@
 use crate::closing::{close_with, file, named, number};
 use crate::real::{crate_folder, data};
 use model_fit::Verdict;
-use model_fit::{Left, ModelReport, Search};
+use model_fit::{ModelReport, ResidualComparison, Search};
 use std::path::{Path, PathBuf};
 
 fn shipped(name: &str) -> String {
@@ -34,7 +34,7 @@ fn with_terms(text: &str, terms: &[&str]) -> String {
             .collect::<String>()
 }
 
-fn pooled(all: &[Left], of: impl Fn(&Left) -> f64) -> f64 {
+fn pooled(all: &[ResidualComparison], of: impl Fn(&ResidualComparison) -> f64) -> f64 {
     let rows: usize = all.iter().map(|left| left.rows).sum();
     (all.iter().map(|left| left.rows as f64 * of(left).powi(2)).sum::<f64>() / rows as f64).sqrt()
 }
@@ -117,9 +117,11 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
     assert!((root - line).abs() < 0.2 && root + line > 0.99, "{root} {line}");
     // 0.524 for the root; the straight line has 0.603.
     let [before, after] =
-        [|left: &Left| left.rms_before, |left: &Left| left.rms_after].map(|of| pooled(&report.held_out, of));
+        [|left: &ResidualComparison| left.rms_before, |left: &ResidualComparison| left.rms_after]
+            .map(|of| pooled(&report.held_out, of));
     assert!(after <= 0.60 * before, "{before} {after}");
-    let line: Vec<Left> = report.held_out_alternatives.iter().map(|one| one.left.clone()).collect();
+    let line: Vec<ResidualComparison> =
+        report.held_out_alternatives.iter().map(|one| one.residual.clone()).collect();
     assert_eq!(
         (line.len(), report.held_out_alternatives[0].suspect.as_str()),
         (2, "proportional-to-pressure")

@@ -4,8 +4,8 @@ use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress,
 use crate::cli::{ExplainArguments, NewArguments, ReadArguments, SimulateArguments};
 use crate::folder::{self, Folder};
 use model_fit::{
-    ClosedModel, Explained, ModelReport, NewModel, OfAlternative, Roles, Search, Verdict, close_with,
-    explained, extended, look, new_model, read, simulate,
+    AlternativeResidual, ClosedModel, Explanation, ModelReport, NewModel, Roles, Search, Verdict, close_with,
+    explained, extended, new_model, preview_records, read, simulate,
 };
 use pagekit::significant;
 use serde::de::{DeserializeOwned, Error as _};
@@ -56,7 +56,7 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
 /// `check` of records with a model file: what can be said before anything is fitted.
 pub(super) fn check_command(arguments: &RecordArguments, out: Option<&Folder>) -> Result<Exit, CommandError> {
     no_options_of_a_rig(&arguments.read, &[], false)?;
-    let all = look(&arguments.rig, &arguments.train)?;
+    let all = preview_records(&arguments.rig, &arguments.train)?;
     let mut text = String::new();
     for one in &all {
         let _ = writeln!(text, "{}: {} rows, {:.3} s: can be used", one.record, one.rows, one.length_s);
@@ -159,7 +159,7 @@ pub(super) fn explain_command(arguments: &ExplainArguments) -> Result<Exit, Comm
         let refused = || format!("--html {}: it is read here: name another", html.display());
         spare(html, &read).map_err(|_| CommandError::BadData(refused()))?;
     }
-    let Explained { text, page } = explained(model, train)?;
+    let Explanation { text, page } = explained(model, train)?;
     if let Some(html) = html {
         folder::write(html, &page)?;
     }
@@ -196,11 +196,11 @@ fn in_words(report: &ModelReport) -> String {
             left.record, left.output, left.rms_before, left.unit, left.rms_after
         );
     }
-    for OfAlternative { suspect, instead_of, left } in &report.held_out_alternatives {
+    for AlternativeResidual { suspect, instead_of, residual } in &report.held_out_alternatives {
         let _ = writeln!(
             text,
             "{}: {} {:.4} {} rms with {suspect} in place of {instead_of}",
-            left.record, left.output, left.rms_after, left.unit
+            residual.record, residual.output, residual.rms_after, residual.unit
         );
     }
     for residual in &report.residuals {

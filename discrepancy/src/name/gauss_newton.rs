@@ -158,10 +158,10 @@ fn stepped(
         return with_all;
     }
     match (with_all, line_search(engine, estimator, iterate, linearisation, chosen, &outliers)) {
-        (Step::Taken(all), Step::Taken(fewer)) => {
-            Step::Taken(if fewer.loss.total_cmp(&all.loss).is_lt() { fewer } else { all })
+        (Step::Accepted(all), Step::Accepted(fewer)) => {
+            Step::Accepted(if fewer.loss.total_cmp(&all.loss).is_lt() { fewer } else { all })
         }
-        (_, Step::Taken(fewer)) => Step::Taken(fewer),
+        (_, Step::Accepted(fewer)) => Step::Accepted(fewer),
         (with_all, _) => with_all,
     }
 }
@@ -192,7 +192,7 @@ fn line_search(
             });
         };
         if tried.loss < iterate.loss {
-            return Step::Taken(tried);
+            return Step::Accepted(tried);
         }
         let nonlinear = |window: &usize| {
             tried.squares[*window] - fit.squares[*window]

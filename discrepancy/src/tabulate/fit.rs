@@ -374,7 +374,7 @@ pub(super) fn fit(engine: &Engine<'_>, start: Iterate, steps: usize) -> Iterate 
                 Step::Refused { predicted_reduction: f64::INFINITY }
             }
             Convergence { iterations: 0, .. } => Step::Refused { predicted_reduction: 0.0 },
-            _ => Step::Taken(next),
+            _ => Step::Accepted(next),
         }
     });
     fitted

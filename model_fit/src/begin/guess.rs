@@ -40,7 +40,7 @@ const STEPWISE: f64 = 0.5;
 const ASKED: &str = "named on the command line";
 
 /// The column of the time.
-pub(super) struct Time {
+pub(super) struct TimeColumn {
     pub(super) column: String,
     pub(super) unit: String,
     /// Median distance of samples, and that of the last from the first, s.
@@ -87,7 +87,7 @@ pub(super) fn columns(
     record: &Path,
     table: &Table,
     roles: Roles<'_>,
-) -> Result<(Time, Vec<Column>), NewError> {
+) -> Result<(TimeColumn, Vec<Column>), NewError> {
     let file = || record.display().to_string();
     let numbers: Vec<&str> = (0..table.head.len())
         .filter(|index| table.is_number[*index])
@@ -123,7 +123,7 @@ pub(super) fn columns(
     let is_growing = read.time_s.len() > 1 && read.time_s.windows(2).all(|pair| pair[0] < pair[1]);
     let time = match (named, calendar.filter(|_| is_growing)) {
         (None, Some(column)) => {
-            Time { column: column.into(), unit: "iso8601".into(), ..time(("", None), &read.time_s) }
+            TimeColumn { column: column.into(), unit: "iso8601".into(), ..time(("", None), &read.time_s) }
         }
         _ => {
             let Some(place) = named.or(growing.first().copied()) else {
@@ -168,7 +168,7 @@ fn filled(values: Vec<Option<f64>>) -> Vec<f64> {
     values.into_iter().map(fill).collect()
 }
 
-fn time((column, unit): (&str, Option<&str>), values: &[f64]) -> Time {
+fn time((column, unit): (&str, Option<&str>), values: &[f64]) -> TimeColumn {
     let (_, unit, _) = named_with(column, unit);
     let is_time = Unit::parse(&unit).is_ok_and(|unit| unit.dimension == model::Dimension::TIME);
     let unit = if is_time { unit } else { "s".to_owned() };
@@ -176,7 +176,7 @@ fn time((column, unit): (&str, Option<&str>), values: &[f64]) -> Time {
     let mut steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let step = median(&mut steps).expect("a time that grows has two values");
     let length = values[values.len() - 1] - values[0];
-    Time { column: column.into(), unit, step_s: step * factor, length_s: length * factor }
+    TimeColumn { column: column.into(), unit, step_s: step * factor, length_s: length * factor }
 }
 
 fn column((column, unit): (&str, Option<&str>), values: Vec<f64>, step_s: f64, others: &[Column]) -> Column {

@@ -1,6 +1,6 @@
 //! What a search found, in a report.
 
-use super::super::report::{ModelReport, Number, place, term};
+use super::super::report::{ModelReport, ParameterEstimate, place, term};
 use super::Discovery;
 use crate::Verdict;
 use serde::{Deserialize, Serialize};
@@ -63,8 +63,9 @@ impl ModelReport {
 
     /// A term with its coefficient and the band of it.
     pub(in super::super) fn in_words(&self, one: &DiscoveredTerm) -> String {
-        let is_it =
-            |number: &&Number| number.suspect.as_deref() == Some(&one.name) && number.name == "k_found";
+        let is_it = |number: &&ParameterEstimate| {
+            number.suspect.as_deref() == Some(&one.name) && number.name == "k_found"
+        };
         let Some(k) = self.parameters.iter().find(is_it) else { return one.name.clone() };
         let significant = super::super::report::significant;
         let band = k.standard_error.map_or(String::new(), |error| format!(" ± {}", significant(error)));

@@ -13,7 +13,7 @@
 //! Source: Brunton, Proctor, Kutz 2016, PNAS 113(15) (library of candidate terms).
 
 use super::super::select::Fitted;
-use super::super::sensors::said;
+use super::super::sensors::part_values;
 use model::{Model, Part, Target};
 use std::fmt::Write as _;
 
@@ -83,7 +83,7 @@ pub(super) fn variables(baseline: &Fitted<'_>) -> Vec<Variable> {
     });
     let states = model.states.iter().enumerate().filter(|(_, state)| state.suspect.is_none());
     let states = states.filter_map(|(index, state)| {
-        variable((&state.name, &state.unit, true), said(baseline, Part::State(index))?)
+        variable((&state.name, &state.unit, true), part_values(baseline, Part::State(index))?)
     });
     inputs.chain(states).collect()
 }

@@ -17,7 +17,7 @@
 
 use super::super::fit::Fitting;
 use super::super::judge::GAIN_APART;
-use super::super::record::Measured;
+use super::super::record::MeasuredRecord;
 use super::super::report::ModelReport;
 use super::super::select::{Fitted, SAME, effective};
 use super::features::{Term, group_terms, variables};
@@ -75,17 +75,17 @@ pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
     let terms = group_terms(model, &variables(baseline), period_s(&baseline.fitting));
     let text: String = terms.iter().map(|term| term.text.as_str()).collect();
     let text = format!("{}\n{text}", model.text);
-    let grown = Model::parse(&text, Path::new("model with the terms of places")).ok()?;
+    let with_terms = Model::parse(&text, Path::new("model with the terms of places")).ok()?;
     let first = model.suspects.len();
-    let screen = Screen::of(&grown, baseline, first, terms.len())?;
+    let screen = Screen::of(&with_terms, baseline, first, terms.len())?;
     let mut samples: f64 = baseline.effective.iter().sum();
-    let mut groups = groups(&grown, first, &terms);
+    let mut groups = groups(&with_terms, first, &terms);
     groups.iter_mut().for_each(|group| group.weigh(screen.share(&group.terms), samples));
     groups.sort_by(|one, other| other.worth.total_cmp(&one.worth));
     let rows: usize = baseline.fitting.records.iter().map(|record| record.time_s.len()).sum();
     groups.truncate((ROWS / rows.max(1)).clamp(FITTED[0], FITTED[1]));
     let fits: Vec<Option<(f64, f64)>> =
-        groups.par_iter().map(|group| refit((&grown, first), baseline, &screen, &group.terms)).collect();
+        groups.par_iter().map(|group| refit((&with_terms, first), baseline, &screen, &group.terms)).collect();
     for (group, fit) in groups.iter_mut().zip(&fits) {
         group.weigh(fit.map_or(group.share, |(share, _)| share), samples);
     }
@@ -118,7 +118,7 @@ impl Group {
 /// Share of what is left that some terms explain, fitted together with all that the model leaves open from the coefficients of
 /// the linear screening, and what the residual is worth in independent samples then; `None` where that cannot be simulated.
 fn refit(
-    (grown, first): (&Model, usize),
+    (with_terms, first): (&Model, usize),
     baseline: &Fitted<'_>,
     screen: &Screen,
     terms: &[usize],
@@ -127,10 +127,12 @@ fn refit(
     let (terms, coefficients_si) = screen.together(terms);
     let suspects: Vec<usize> = terms.iter().map(|term| first + term).collect();
     let of = |index: usize| {
-        let place = suspects.iter().position(|suspect| coefficient(grown, Some(*suspect)) == Some(index));
+        let place =
+            suspects.iter().position(|suspect| coefficient(with_terms, Some(*suspect)) == Some(index));
         place.map(|place| coefficients_si[place])
     };
-    let fitting = Fitting::new(grown, Program::new(grown, &suspects).ok()?, before.records, &suspects);
+    let fitting =
+        Fitting::new(with_terms, Program::new(with_terms, &suspects).ok()?, before.records, &suspects);
     // All of the screened coefficients, or nothing: a strong term may be far from straight.
     let start =
         |share: f64| start(&fitting, baseline, |index| of(index).map(|screened_si| share * screened_si));
@@ -177,7 +179,7 @@ fn rank(target: model::Target, name: &str, variables: &[String]) -> usize {
 
 /// Shortest mean period of the samples, s.
 fn period_s(fitting: &Fitting<'_>) -> f64 {
-    let period = |record: &Measured| {
+    let period = |record: &MeasuredRecord| {
         let times = &record.sampled_s;
         (times[times.len() - 1] - times[0]) / (times.len() - 1) as f64
     };

@@ -10,7 +10,7 @@
 //!
 //! Source: Meinshausen, Bühlmann 2010, JRSS B 72(4); Shah, Samworth 2013, JRSS B 75(1) (complementary halves).
 
-use super::super::fit::{Fitting, What};
+use super::super::fit::{Fitting, UnknownKind};
 use super::super::select::Fitted;
 use model::{Model, Program};
 use nalgebra::{DMatrix, DVector};
@@ -31,15 +31,15 @@ const SAME_DIRECTION: f64 = 0.8;
 pub(super) struct Screen {
     sensitivities: DMatrix<f64>,
     terms: DMatrix<f64>,
-    left: DVector<f64>,
+    residual: DVector<f64>,
     block_of: Vec<usize>,
     blocks: usize,
-    whole: Projected,
+    whole: ProjectedGains,
 }
 
 /// Sums over some rows.
 #[derive(Clone)]
-struct Sums {
+struct RowSums {
     /// Of products of sensitivities.
     information: DMatrix<f64>,
     /// Of sensitivities with terms.
@@ -52,7 +52,7 @@ struct Sums {
 }
 
 /// Gain and coefficient of each term; both 0 of one that looks like the model's own numbers.
-struct Projected {
+struct ProjectedGains {
     gains: Vec<f64>,
     coefficients_si: Vec<f64>,
 }
@@ -71,13 +71,13 @@ impl Screen {
             .collect();
         let (slopes, values) = fitting.sensitivities(&fitted.point.values_si, &scale).ok()?;
         let sensitivities = DMatrix::from_row_slice(values.len(), fitting.unknowns.len(), &slopes);
-        let cut = fitting.in_time();
-        let (mut left, mut block_of) = (Vec::new(), Vec::new());
+        let cut = fitting.blocks_in_time();
+        let (mut residual, mut block_of) = (Vec::new(), Vec::new());
         for (record, blocks) in fitting.records.iter().zip(&cut.block_of) {
             for (row, block) in blocks.iter().enumerate() {
                 for (output, scale) in scale.iter().enumerate() {
                     let Some(measured) = record.outputs[output][row] else { continue };
-                    left.push(scale * measured - values[left.len()]);
+                    residual.push(scale * measured - values[residual.len()]);
                     block_of.push(*block);
                 }
             }
@@ -85,17 +85,17 @@ impl Screen {
         let all: Vec<usize> = (first..first + count).collect();
         let columns: Vec<DMatrix<f64>> = all
             .par_chunks(CHUNK)
-            .map(|chunk| responses(model, fitted, chunk, (&scale, left.len())))
+            .map(|chunk| responses(model, fitted, chunk, (&scale, residual.len())))
             .collect();
-        let mut terms = DMatrix::zeros(left.len(), count);
+        let mut terms = DMatrix::zeros(residual.len(), count);
         for (place, columns) in columns.iter().enumerate() {
             terms.columns_mut(place * CHUNK, columns.ncols()).copy_from(columns);
         }
-        let left = DVector::from_vec(left);
-        let whole = Projected { gains: Vec::new(), coefficients_si: Vec::new() };
-        let mut screen = Self { sensitivities, terms, left, block_of, blocks: cut.blocks, whole };
+        let residual = DVector::from_vec(residual);
+        let whole = ProjectedGains { gains: Vec::new(), coefficients_si: Vec::new() };
+        let mut screen = Self { sensitivities, terms, residual, block_of, blocks: cut.blocks, whole };
         let sums = screen.sums();
-        let whole = sums.iter().skip(1).fold(sums[0].clone(), Sums::plus);
+        let whole = sums.iter().skip(1).fold(sums[0].clone(), RowSums::plus);
         screen.whole = whole.projected();
         Some(screen)
     }
@@ -127,17 +127,17 @@ impl Screen {
 
     /// Share of what is left, beyond what the model's own numbers explain, that some terms explain together.
     pub(super) fn share(&self, terms: &[usize]) -> f64 {
-        let (rest, left) = (self.rest(self.terms.select_columns(terms)), self.left_rest());
-        let along = rest.tr_mul(&left);
+        let (rest, residual) = (self.rest(self.terms.select_columns(terms)), self.projected_residual());
+        let along = rest.tr_mul(&residual);
         let explained = (along.transpose() * inverse(&rest.tr_mul(&rest)) * &along)[(0, 0)];
-        (explained / left.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
+        (explained / residual.norm_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)
     }
 
     /// Those of some terms that do not look like the model's own numbers, and the coefficients by which they explain most
     /// together.
     pub(super) fn together(&self, terms: &[usize]) -> (Vec<usize>, Vec<f64>) {
         let rest = self.rest(self.terms.select_columns(terms));
-        let coefficients_si = inverse(&rest.tr_mul(&rest)) * rest.tr_mul(&self.left_rest());
+        let coefficients_si = inverse(&rest.tr_mul(&rest)) * rest.tr_mul(&self.projected_residual());
         let all = terms.iter().zip(rest.column_iter()).zip(coefficients_si.iter());
         let apart = all.filter(|((_, change), _)| change.norm_squared() > 0.0);
         apart.map(|((term, _), coefficient_si)| (*term, *coefficient_si)).unzip()
@@ -145,20 +145,20 @@ impl Screen {
 
     /// What terms do beyond the model's own numbers; 0 where that is nearly nothing.
     fn rest(&self, terms: DMatrix<f64>) -> DMatrix<f64> {
-        let mut rest = self.beyond(terms.clone());
-        for (mut left, whole) in rest.column_iter_mut().zip(terms.column_iter()) {
-            if left.norm_squared() <= HIDDEN * whole.norm_squared() {
-                left.fill(0.0);
+        let mut rest = self.project_off(terms.clone());
+        for (mut residual, whole) in rest.column_iter_mut().zip(terms.column_iter()) {
+            if residual.norm_squared() <= HIDDEN * whole.norm_squared() {
+                residual.fill(0.0);
             }
         }
         rest
     }
 
-    fn left_rest(&self) -> DMatrix<f64> {
-        self.beyond(DMatrix::from_column_slice(self.left.len(), 1, self.left.as_slice()))
+    fn projected_residual(&self) -> DMatrix<f64> {
+        self.project_off(DMatrix::from_column_slice(self.residual.len(), 1, self.residual.as_slice()))
     }
 
-    fn beyond(&self, change: DMatrix<f64>) -> DMatrix<f64> {
+    fn project_off(&self, change: DMatrix<f64>) -> DMatrix<f64> {
         let taken =
             inverse(&self.sensitivities.tr_mul(&self.sensitivities)) * self.sensitivities.tr_mul(&change);
         change - &self.sensitivities * taken
@@ -198,9 +198,9 @@ impl Screen {
     }
 
     /// Sums of each block; the last holds rows that judge nothing.
-    fn sums(&self) -> Vec<Sums> {
+    fn sums(&self) -> Vec<RowSums> {
         let (numbers, terms) = (self.sensitivities.ncols(), self.terms.ncols());
-        let zero = Sums {
+        let zero = RowSums {
             information: DMatrix::zeros(numbers, numbers),
             cross: DMatrix::zeros(numbers, terms),
             squares: DVector::zeros(terms),
@@ -208,17 +208,18 @@ impl Screen {
             term_scores: DVector::zeros(terms),
         };
         let of_block = |block: usize| {
-            let rows: Vec<usize> = (0..self.left.len()).filter(|row| self.block_of[*row] == block).collect();
+            let rows: Vec<usize> =
+                (0..self.residual.len()).filter(|row| self.block_of[*row] == block).collect();
             if rows.is_empty() {
                 return zero.clone();
             }
             let (slopes, terms) = (self.sensitivities.select_rows(&rows), self.terms.select_rows(&rows));
-            let left = self.left.select_rows(&rows);
-            Sums {
+            let residual = self.residual.select_rows(&rows);
+            RowSums {
                 cross: slopes.tr_mul(&terms),
                 squares: DVector::from_iterator(terms.ncols(), terms.column_iter().map(|g| g.norm_squared())),
-                scores: slopes.tr_mul(&left),
-                term_scores: terms.tr_mul(&left),
+                scores: slopes.tr_mul(&residual),
+                term_scores: terms.tr_mul(&residual),
                 information: slopes.tr_mul(&slopes),
             }
         };
@@ -226,7 +227,7 @@ impl Screen {
     }
 }
 
-impl Sums {
+impl RowSums {
     fn plus(mut self, other: &Self) -> Self {
         self.information += &other.information;
         self.cross += &other.cross;
@@ -236,7 +237,7 @@ impl Sums {
         self
     }
 
-    fn projected(&self) -> Projected {
+    fn projected(&self) -> ProjectedGains {
         let inverse = inverse(&self.information);
         let along = self.cross.tr_mul(&(&inverse * &self.scores));
         let taken = &inverse * &self.cross;
@@ -250,7 +251,7 @@ impl Sums {
             }
         };
         let (gains, coefficients_si) = (0..self.squares.len()).map(of).unzip();
-        Projected { gains, coefficients_si }
+        ProjectedGains { gains, coefficients_si }
     }
 }
 
@@ -286,20 +287,20 @@ fn responses(
     let suspects: Vec<usize> = fitted.suspects.iter().chain(&new).copied().collect();
     let Ok(program) = Program::new(model, &suspects) else { return columns };
     let mut wider = Fitting::new(model, program, fitting.records, &suspects);
-    let known = |what: What| fitting.unknowns.iter().position(|unknown| unknown.what == what);
-    let of = |what: What| match what {
-        What::Shared(index) if Some(index) == coefficient(model, model.parameters[index].suspect) => {
+    let known = |kind: UnknownKind| fitting.unknowns.iter().position(|unknown| unknown.kind == kind);
+    let of = |kind: UnknownKind| match kind {
+        UnknownKind::Shared(index) if Some(index) == coefficient(model, model.parameters[index].suspect) => {
             new.iter().position(|term| Some(*term) == model.parameters[index].suspect).map(|place| new[place])
         }
         _ => None,
     };
-    wider.unknowns.retain(|unknown| known(unknown.what).is_some() || of(unknown.what).is_some());
-    let value = |what: What| known(what).map_or(0.0, |place| fitted.point.values_si[place]);
-    let values: Vec<f64> = wider.unknowns.iter().map(|unknown| value(unknown.what)).collect();
+    wider.unknowns.retain(|unknown| known(unknown.kind).is_some() || of(unknown.kind).is_some());
+    let value = |kind: UnknownKind| known(kind).map_or(0.0, |place| fitted.point.values_si[place]);
+    let values: Vec<f64> = wider.unknowns.iter().map(|unknown| value(unknown.kind)).collect();
     let Ok((slopes, _)) = wider.sensitivities(&values, scale) else { return columns };
     let width = values.len();
     for (place, unknown) in wider.unknowns.iter().enumerate() {
-        let Some(term) = of(unknown.what).filter(|_| known(unknown.what).is_none()) else { continue };
+        let Some(term) = of(unknown.kind).filter(|_| known(unknown.kind).is_none()) else { continue };
         let column = terms.iter().position(|other| *other == term).expect("it is one of them");
         for row in 0..rows {
             let slope = slopes[row * width + place];

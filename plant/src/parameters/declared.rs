@@ -213,10 +213,10 @@ impl Reader<'_> {
             };
             Axis::ALL.into_iter().flat_map(one).collect()
         };
-        let symbols = || places().into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(", ");
-        let place = section.needed_text("place", &format!("what it adds to, one of {}", symbols()))?;
+        let allowed = || places().into_iter().map(|(name, ..)| name).collect::<Vec<_>>().join(", ");
+        let place = section.needed_text("place", &format!("what it adds to, one of {}", allowed()))?;
         let Some((_, axis, target)) = places().into_iter().find(|(name, ..)| *name == place.text) else {
-            let why = format!("place = \"{}\"; allowed is {}", place.text, symbols());
+            let why = format!("place = \"{}\"; allowed is {}", place.text, allowed());
             return Err(self.source.wrong_from(place.at, &why));
         };
         let library = used.as_ref().map(|used| used.at);
