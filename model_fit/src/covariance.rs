@@ -18,7 +18,7 @@
 //! Sources: Künsch 1989, Annals of Statistics 17(3) (blocks).
 
 use super::bounds;
-use super::fit::UnknownKind;
+use super::fit::UnknownId;
 use super::normal::{correlations, standard_errors};
 use super::select::Fitted;
 use nalgebra::{DMatrix, DVector};
@@ -46,15 +46,15 @@ pub(super) fn errors(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) 
     let of_blocks = of_blocks(&fitted.steps);
     let all = fitting.unknowns.iter().zip(&fitted.point.values_si).zip(errors.into_iter().zip(of_blocks));
     all.map(|((unknown, value), (error, of_blocks))| {
-        let of_law = if has_law { of_law(*value, before(baseline, unknown.kind)) } else { 0.0 };
+        let of_law = if has_law { of_law(*value, before(baseline, unknown.id)) } else { 0.0 };
         error.map(|error| NumberError { of_records: (error * inflation).max(of_blocks), of_law })
     })
     .collect()
 }
 
 /// What a number is in another fit.
-pub(super) fn before(baseline: &Fitted<'_>, kind: UnknownKind) -> Option<f64> {
-    let place = baseline.fitting.unknowns.iter().position(|other| other.kind == kind);
+pub(super) fn before(baseline: &Fitted<'_>, id: UnknownId) -> Option<f64> {
+    let place = baseline.fitting.unknowns.iter().position(|other| other.id == id);
     place.map(|place| baseline.point.values_si[place])
 }
 

@@ -21,7 +21,7 @@ mod features;
 mod place;
 mod screen;
 
-use super::fit::{Fitting, OPTIONS, Unknown, UnknownKind};
+use super::fit::{Fitting, OPTIONS, Unknown, UnknownId};
 use super::judge::{Evaluation, GAIN_APART, judge};
 use super::record::MeasuredRecord;
 use super::select::{Fitted, MOST_TERMS, SAME, SearchResult, fitted, fitted_from};
@@ -133,10 +133,10 @@ pub(super) fn search<'a>(
 /// Where the fit of a model with more terms begins: at what the smaller one gave, and at the coefficients of the linear
 /// screening, by their parameters.
 fn start(fitting: &Fitting<'_>, before: &Fitted<'_>, screened_si: impl Fn(usize) -> Option<f64>) -> Vec<f64> {
-    let known = |kind: UnknownKind| before.fitting.unknowns.iter().position(|unknown| unknown.kind == kind);
-    let value = |unknown: &Unknown| match (unknown.kind, known(unknown.kind)) {
+    let known = |id: UnknownId| before.fitting.unknowns.iter().position(|unknown| unknown.id == id);
+    let value = |unknown: &Unknown| match (unknown.id, known(unknown.id)) {
         (_, Some(place)) => before.point.values_si[place],
-        (UnknownKind::Shared(index), None) => screened_si(index).unwrap_or(unknown.start_si),
+        (UnknownId::Shared(index), None) => screened_si(index).unwrap_or(unknown.start_si),
         _ => unknown.start_si,
     };
     fitting.unknowns.iter().map(value).collect()

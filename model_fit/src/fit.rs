@@ -40,9 +40,9 @@ const FASTEST: f64 = 0.25;
 const STEPS_OF_START: usize = 10;
 const STEPS_OF_SAMPLE: usize = 30;
 
-/// What a fitted number is: indices of parameter or state, then of the record.
+/// A fitted number by its indices: of the parameter or state, then of the record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum UnknownKind {
+pub(crate) enum UnknownId {
     /// A parameter, of all records.
     Shared(usize),
     /// A parameter of one record.
@@ -54,7 +54,7 @@ pub(crate) enum UnknownKind {
 /// A number that is fitted.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Unknown {
-    pub(crate) kind: UnknownKind,
+    pub(crate) id: UnknownId,
     pub(crate) start_si: f64,
     pub(crate) range_si: [f64; 2],
     /// What is known of it: value and standard deviation.
@@ -135,23 +135,23 @@ impl<'a> Fitting<'a> {
             if parameter.is_bound_by_samples {
                 range_si[0] = range_si[0].max(fastest_s(records)).min(range_si[1]);
             }
-            let unknown = |kind| Unknown {
-                kind,
+            let unknown = |id| Unknown {
+                id,
                 start_si: parameter.values_si[0].clamp(range_si[0], range_si[1]),
                 range_si,
                 prior_si: parameter.tolerance_si.map(|tolerance| [parameter.values_si[0], tolerance]),
             };
             if parameter.is_per_record {
                 unknowns
-                    .extend((0..records.len()).map(|record| unknown(UnknownKind::PerRecord(index, record))));
+                    .extend((0..records.len()).map(|record| unknown(UnknownId::PerRecord(index, record))));
             } else {
-                unknowns.push(unknown(UnknownKind::Shared(index)));
+                unknowns.push(unknown(UnknownId::Shared(index)));
             }
         }
         for state in program.states() {
             if let Start::Fitted { guess_si, range_si } = model.states[*state].start {
                 let unknown = |record| Unknown {
-                    kind: UnknownKind::Start(*state, record),
+                    id: UnknownId::Start(*state, record),
                     start_si: guess_si,
                     range_si,
                     prior_si: None,
@@ -201,11 +201,11 @@ impl<'a> Fitting<'a> {
     ) -> Self {
         let mut other = Self::new(fitted.model, fitted.program.clone(), records, suspects);
         for (unknown, value) in fitted.unknowns.iter().zip(&point.values_si) {
-            if let UnknownKind::Shared(index) = unknown.kind {
+            if let UnknownId::Shared(index) = unknown.id {
                 other.parameters_si.iter_mut().for_each(|parameters| parameters[index] = *value);
             }
         }
-        other.unknowns.retain(|unknown| !matches!(unknown.kind, UnknownKind::Shared(_)));
+        other.unknowns.retain(|unknown| !matches!(unknown.id, UnknownId::Shared(_)));
         for (range, record) in other.in_score.iter_mut().zip(records) {
             *range = 0..rows.min(record.time_s.len());
         }
@@ -267,12 +267,12 @@ impl<'a> Fitting<'a> {
         let mut directions = Vec::new();
         for place in self.of_record(record) {
             let value = values_si[place];
-            directions.push(match self.unknowns[place].kind {
-                UnknownKind::Shared(index) | UnknownKind::PerRecord(index, _) => {
+            directions.push(match self.unknowns[place].id {
+                UnknownId::Shared(index) | UnknownId::PerRecord(index, _) => {
                     parameters[index] = value;
                     Direction::Parameter(index)
                 }
-                UnknownKind::Start(state, _) => {
+                UnknownId::Start(state, _) => {
                     starts[state] = value;
                     Direction::Start(state)
                 }
@@ -340,9 +340,9 @@ impl<'a> Fitting<'a> {
 
     /// Unknowns that a record is simulated with, in the order of its directions.
     pub(super) fn of_record(&self, record: usize) -> Vec<usize> {
-        let is_mine = |place: &usize| match self.unknowns[*place].kind {
-            UnknownKind::Shared(_) => true,
-            UnknownKind::PerRecord(_, of) | UnknownKind::Start(_, of) => of == record,
+        let is_mine = |place: &usize| match self.unknowns[*place].id {
+            UnknownId::Shared(_) => true,
+            UnknownId::PerRecord(_, of) | UnknownId::Start(_, of) => of == record,
         };
         (0..self.unknowns.len()).filter(is_mine).collect()
     }
@@ -350,34 +350,27 @@ impl<'a> Fitting<'a> {
     /// What people call a number.
     pub(crate) fn name_of(&self, unknown: &Unknown) -> String {
         let record = |record: usize| &self.records[record].name;
-        match unknown.kind {
-            UnknownKind::Shared(index) => self.model.parameters[index].name.clone(),
-            UnknownKind::PerRecord(index, of) => {
-                format!("{} of {}", self.model.parameters[index].name, record(of))
-            }
-            UnknownKind::Start(state, of) => {
-                format!("start of {} in {}", self.model.states[state].name, record(of))
-            }
+        let Model { parameters, states, .. } = self.model;
+        match unknown.id {
+            UnknownId::Shared(index) => parameters[index].name.clone(),
+            UnknownId::PerRecord(index, of) => format!("{} of {}", parameters[index].name, record(of)),
+            UnknownId::Start(state, of) => format!("start of {} in {}", states[state].name, record(of)),
         }
     }
 
     /// The term or suspect that it belongs to.
     pub(crate) fn suspect_of(&self, unknown: &Unknown) -> Option<usize> {
-        match unknown.kind {
-            UnknownKind::Shared(index) | UnknownKind::PerRecord(index, _) => {
-                self.model.parameters[index].suspect
-            }
-            UnknownKind::Start(state, _) => self.model.states[state].suspect,
+        match unknown.id {
+            UnknownId::Shared(index) | UnknownId::PerRecord(index, _) => self.model.parameters[index].suspect,
+            UnknownId::Start(state, _) => self.model.states[state].suspect,
         }
     }
 
     /// Unit in which the model file writes an unknown.
     pub(crate) fn unit_of(&self, unknown: &Unknown) -> &'a Unit {
-        match unknown.kind {
-            UnknownKind::Shared(index) | UnknownKind::PerRecord(index, _) => {
-                &self.model.parameters[index].unit
-            }
-            UnknownKind::Start(state, _) => &self.model.states[state].unit,
+        match unknown.id {
+            UnknownId::Shared(index) | UnknownId::PerRecord(index, _) => &self.model.parameters[index].unit,
+            UnknownId::Start(state, _) => &self.model.states[state].unit,
         }
     }
 

@@ -10,7 +10,7 @@
 //! A start belongs to its record, as on a held-out record, where it is fitted, too: without the first block nothing else would
 //! determine it, and the fold would ask what the model never claims.
 
-use super::fit::{Fitting, Point, UnknownKind};
+use super::fit::{Fitting, Point, UnknownId};
 use super::normal::{Normal, solved};
 use super::record::MeasuredRecord;
 use super::select::Fitted;
@@ -29,7 +29,7 @@ pub(super) fn steps(
     point: &Point,
 ) -> Vec<DVector<f64>> {
     let is_own: Vec<bool> =
-        fitting.unknowns.iter().map(|unknown| !matches!(unknown.kind, UnknownKind::Shared(_))).collect();
+        fitting.unknowns.iter().map(|unknown| !matches!(unknown.id, UnknownId::Shared(_))).collect();
     let without = |block: &Vec<Normal>| {
         let mut rest = all.clone();
         for (output, normal) in block.iter().enumerate() {
@@ -108,7 +108,7 @@ pub(super) fn refitted(fitted: &Fitted<'_>) -> Option<Folds> {
         let rows = fitting.records.iter().map(|record| record.time_s.len()).max()?;
         let of_records = Fitting::frozen(fitting, &end, fitting.records, &fitted.suspects, rows);
         let start = fitting.unknowns.iter().zip(&end.values_si);
-        let start = start.filter(|(unknown, _)| !matches!(unknown.kind, UnknownKind::Shared(_)));
+        let start = start.filter(|(unknown, _)| !matches!(unknown.id, UnknownId::Shared(_)));
         let (refitted, _) = of_records.fit(start.map(|(_, value)| *value).collect(), STEPS).ok()?;
         let residuals = of_records.residuals(&refitted.values_si).ok()?;
         let squares = |output: usize| {

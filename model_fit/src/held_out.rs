@@ -1,7 +1,7 @@
 //! Both models on records that were not used: shared numbers frozen, the record's own fitted on its first samples, which are not
 //! scored.
 
-use super::fit::{Fitting, OPTIONS, OutputSeries, UnknownKind};
+use super::fit::{Fitting, OPTIONS, OutputSeries, UnknownId};
 use super::record::MeasuredRecord;
 use super::select::{Fitted, Rival, SearchResult};
 use super::starts;
@@ -50,7 +50,7 @@ pub(crate) fn check(model: &Model, records: &[MeasuredRecord]) -> Result<(), Jud
     for record in records {
         let one = std::slice::from_ref(record);
         let fitting = Fitting::new(model, program.clone(), one, &[]);
-        if fitting.unknowns.iter().any(|unknown| !matches!(unknown.kind, UnknownKind::Shared(_))) {
+        if fitting.unknowns.iter().any(|unknown| !matches!(unknown.id, UnknownId::Shared(_))) {
             has_start(model.start_samples, record)?;
         }
     }

@@ -16,7 +16,7 @@
 //!
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
-use super::fit::UnknownKind;
+use super::fit::UnknownId;
 use super::folds::{Folds, fold_t, gained, in_units};
 use super::select::Fitted;
 use crate::estimator::Convergence;
@@ -164,8 +164,8 @@ fn judge_by_folds(
     let (score, gate) =
         gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are three at least");
     let unknowns = after.fitting.unknowns.iter().zip(&after.point.values_si);
-    let values_si = unknowns.filter_map(|(unknown, value)| match unknown.kind {
-        UnknownKind::Shared(index) | UnknownKind::PerRecord(index, 0)
+    let values_si = unknowns.filter_map(|(unknown, value)| match unknown.id {
+        UnknownId::Shared(index) | UnknownId::PerRecord(index, 0)
             if after.fitting.model.parameters[index].suspect == Some(suspect) =>
         {
             Some((index, *value))

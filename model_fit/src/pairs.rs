@@ -12,7 +12,7 @@
 //!
 //! Source: Miller 2002, Subset Selection in Regression, 2nd edition, 3.9 (replacing two at a time).
 
-use super::fit::{Fitting, UnknownKind};
+use super::fit::{Fitting, UnknownId};
 use super::judge::{Evaluation, GAIN_APART, ReferenceFits, judge};
 use super::progress::ProgressCounter;
 use super::select::{Fitted, SearchResult, fitted_from};
@@ -37,7 +37,7 @@ pub(super) struct Pair<'a> {
 /// A suspect at a point: its numbers by parameter, and what it does.
 struct Response {
     suspect: usize,
-    values_si: Vec<(UnknownKind, f64)>,
+    values_si: Vec<(UnknownId, f64)>,
     change: DVector<f64>,
     /// Its product with what the model leaves, and with itself.
     gain: f64,
@@ -139,10 +139,10 @@ fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Re
     let (accepted, values_si, scale) = (&base.suspects[..], &point.values_si[..], &beside.scale[..]);
     let base = structure::ReferenceModel { fitting, accepted, values_si, scale };
     let of_suspect = |(suspect, fit): &&(usize, Fitted<'_>)| -> Vec<Response> {
-        let of_this = |values_si: &[f64]| -> Vec<(UnknownKind, f64)> {
+        let of_this = |values_si: &[f64]| -> Vec<(UnknownId, f64)> {
             let all = fit.fitting.unknowns.iter().zip(values_si);
             let chosen = all.filter(|(unknown, _)| fit.fitting.suspect_of(unknown) == Some(*suspect));
-            chosen.map(|(unknown, value)| (unknown.kind, *value)).collect()
+            chosen.map(|(unknown, value)| (unknown.id, *value)).collect()
         };
         let points = starts::of_newest(&fit.fitting, &fit.suspects, (fitting, point));
         let points = points.iter().map(Vec::as_slice).chain([fit.point.values_si.as_slice()]);
@@ -217,19 +217,19 @@ fn fit<'a>(
     let (model, records) = (base.fitting.model, base.fitting.records);
     let suspects: Vec<usize> = base.suspects.iter().copied().chain(pair).collect();
     let starts = |fitting: &Fitting<'a>| -> Vec<Vec<f64>> {
-        let values_of = |fit: &Fitted<'a>| -> Vec<(UnknownKind, f64)> {
+        let values_of = |fit: &Fitted<'a>| -> Vec<(UnknownId, f64)> {
             let all = fit.fitting.unknowns.iter().zip(&fit.point.values_si);
-            all.map(|(unknown, value)| (unknown.kind, *value)).collect()
+            all.map(|(unknown, value)| (unknown.id, *value)).collect()
         };
-        let with = |known: &[&[(UnknownKind, f64)]]| -> Vec<f64> {
-            let value = |kind: UnknownKind| {
+        let with = |known: &[&[(UnknownId, f64)]]| -> Vec<f64> {
+            let value = |id: UnknownId| {
                 known
                     .iter()
                     .rev()
-                    .find_map(|values| values.iter().find(|(of, _)| *of == kind))
+                    .find_map(|values| values.iter().find(|(of, _)| *of == id))
                     .map(|(_, value)| *value)
             };
-            fitting.unknowns.iter().map(|unknown| value(unknown.kind).unwrap_or(unknown.start_si)).collect()
+            fitting.unknowns.iter().map(|unknown| value(unknown.id).unwrap_or(unknown.start_si)).collect()
         };
         let begin = values_of(base);
         let mut all = Vec::new();

@@ -394,13 +394,13 @@ pub(crate) fn friction(model: &Model, friction: &model::Friction) -> String {
 
 pub(crate) fn place(model: &Model, suspect: usize) -> String {
     let target = model.suspects[suspect].target;
-    let kind = match target {
+    let id = match target {
         model::Target::Input(_) => "input",
         model::Target::State(_) => "equation of",
         model::Target::Definition(_) => "definition",
         model::Target::Output(_) => "output",
     };
-    format!("{kind} {}", model.target_name(target))
+    format!("{id} {}", model.target_name(target))
 }
 
 pub(crate) fn term(model: &Model, suspect: usize) -> String {
@@ -431,7 +431,7 @@ pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool)
             unit: unit.text.clone(),
             value: value / unit.factor,
             standard_error: error.filter(|_| !is_at_bound).map(|error| error.whole() / unit.factor),
-            baseline: covariance::before(baseline, unknown.kind).map(|before| before / unit.factor),
+            baseline: covariance::before(baseline, unknown.id).map(|before| before / unit.factor),
             is_at_bound,
             is_of_one_sign: unknown.range_si[0] >= 0.0 || unknown.range_si[1] <= 0.0,
             expected: unknown.prior_si.map(|prior| prior.map(|value| value / unit.factor)),

@@ -18,7 +18,7 @@
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
 
-use super::fit::{Fitting, OPTIONS, Point, UnknownKind};
+use super::fit::{Fitting, OPTIONS, Point, UnknownId};
 use crate::estimator::{Convergence, Outcome};
 use crate::structure::LinearisedFit;
 use model::Failure;
@@ -80,10 +80,10 @@ pub(super) fn of_newest(
 
 /// First values of a suspect's numbers, all other numbers as in the smaller fit.
 fn beside(fitting: &Fitting<'_>, (smaller, point): (&Fitting<'_>, &Point)) -> Vec<f64> {
-    let known = |kind: UnknownKind| smaller.unknowns.iter().position(|unknown| unknown.kind == kind);
+    let known = |id: UnknownId| smaller.unknowns.iter().position(|unknown| unknown.id == id);
     let value = |place: usize| point.values_si[place];
     let unknowns = fitting.unknowns.iter();
-    unknowns.map(|unknown| known(unknown.kind).map_or(unknown.start_si, value)).collect()
+    unknowns.map(|unknown| known(unknown.id).map_or(unknown.start_si, value)).collect()
 }
 
 fn of_newest_from(fitting: &Fitting<'_>, suspects: &[usize], first: &[f64]) -> Vec<Vec<f64>> {
@@ -241,8 +241,8 @@ fn values_of_newest(fitting: &Fitting<'_>, suspects: &[usize], first: Vec<f64>) 
     {
         let others = parameter.values_si[1..].iter().flat_map(|value| {
             all.iter().map(|start| {
-                let moved = fitting.unknowns.iter().zip(start).map(|(unknown, before)| match unknown.kind {
-                    UnknownKind::Shared(of) | UnknownKind::PerRecord(of, _) if of == index => *value,
+                let moved = fitting.unknowns.iter().zip(start).map(|(unknown, before)| match unknown.id {
+                    UnknownId::Shared(of) | UnknownId::PerRecord(of, _) if of == index => *value,
                     _ => *before,
                 });
                 moved.collect()

@@ -18,7 +18,7 @@
 //!
 //! Source: discrepancy-notes.md, 3; Brun, Reichert, Künsch 2001, Water Resources Research 37(4) (collinearity).
 
-use super::fit::{Fitting, Point, Unknown, UnknownKind};
+use super::fit::{Fitting, Point, Unknown, UnknownId};
 use super::judge::GAIN_APART;
 use super::normal::{Normal, solved, standard_errors};
 use super::select::Fitted;
@@ -251,13 +251,13 @@ impl<'a> ReferenceModel<'a> {
         }
         let Ok((columns, _)) = columns(&extended, &values_si, self.scale) else { return Vec::new() };
         let of_number = |index: &usize| {
-            let is_it = |kind: UnknownKind| match kind {
-                UnknownKind::Shared(of) | UnknownKind::PerRecord(of, _) => of == *index,
-                UnknownKind::Start(..) => false,
+            let is_it = |id: UnknownId| match id {
+                UnknownId::Shared(of) | UnknownId::PerRecord(of, _) => of == *index,
+                UnknownId::Start(..) => false,
             };
             let of_number = extended.unknowns.iter().zip(columns.column_iter());
             of_number
-                .filter(|(unknown, _)| is_it(unknown.kind))
+                .filter(|(unknown, _)| is_it(unknown.id))
                 .map(|(_, column)| column)
                 .fold(DVector::zeros(columns.nrows()), |sum, column| sum + column)
         };
@@ -268,23 +268,23 @@ impl<'a> ReferenceModel<'a> {
     pub(super) fn outputs_with(
         self,
         suspect: usize,
-        of_suspect: &[(UnknownKind, f64)],
+        of_suspect: &[(UnknownId, f64)],
     ) -> Result<DVector<f64>, Failure> {
         let (extended, values_si) = self.with_suspect(suspect, of_suspect);
         Ok(DVector::from_vec(extended.predictions(&values_si, self.scale)?))
     }
 
     /// The fit with one suspect more, and its numbers.
-    fn with_suspect(self, suspect: usize, of_suspect: &[(UnknownKind, f64)]) -> (Fitting<'a>, Vec<f64>) {
+    fn with_suspect(self, suspect: usize, of_suspect: &[(UnknownId, f64)]) -> (Fitting<'a>, Vec<f64>) {
         let ReferenceModel { fitting, accepted, values_si, .. } = self;
         let mut suspects = accepted.to_vec();
         suspects.push(suspect);
         let program = Program::new(fitting.model, &suspects).expect("all suspects together were compiled");
         let extended = Fitting::new(fitting.model, program, fitting.records, &suspects);
-        let known = |kind| fitting.unknowns.iter().position(|unknown| unknown.kind == kind);
+        let known = |id| fitting.unknowns.iter().position(|unknown| unknown.id == id);
         let value = |unknown: &Unknown| {
-            let of_it = of_suspect.iter().find(|(kind, _)| *kind == unknown.kind).map(|(_, value)| *value);
-            of_it.or_else(|| known(unknown.kind).map(|place| values_si[place])).unwrap_or(unknown.start_si)
+            let of_it = of_suspect.iter().find(|(id, _)| *id == unknown.id).map(|(_, value)| *value);
+            of_it.or_else(|| known(unknown.id).map(|place| values_si[place])).unwrap_or(unknown.start_si)
         };
         let values_si = extended.unknowns.iter().map(value).collect();
         (extended, values_si)

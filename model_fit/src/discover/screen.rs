@@ -10,7 +10,7 @@
 //!
 //! Source: Meinshausen, Bühlmann 2010, JRSS B 72(4); Shah, Samworth 2013, JRSS B 75(1) (complementary halves).
 
-use super::super::fit::{Fitting, UnknownKind};
+use super::super::fit::{Fitting, UnknownId};
 use super::super::select::Fitted;
 use model::{Model, Program};
 use nalgebra::{DMatrix, DVector};
@@ -287,20 +287,20 @@ fn responses(
     let suspects: Vec<usize> = fitted.suspects.iter().chain(&new).copied().collect();
     let Ok(program) = Program::new(model, &suspects) else { return columns };
     let mut wider = Fitting::new(model, program, fitting.records, &suspects);
-    let known = |kind: UnknownKind| fitting.unknowns.iter().position(|unknown| unknown.kind == kind);
-    let of = |kind: UnknownKind| match kind {
-        UnknownKind::Shared(index) if Some(index) == coefficient(model, model.parameters[index].suspect) => {
+    let known = |id: UnknownId| fitting.unknowns.iter().position(|unknown| unknown.id == id);
+    let of = |id: UnknownId| match id {
+        UnknownId::Shared(index) if Some(index) == coefficient(model, model.parameters[index].suspect) => {
             new.iter().position(|term| Some(*term) == model.parameters[index].suspect).map(|place| new[place])
         }
         _ => None,
     };
-    wider.unknowns.retain(|unknown| known(unknown.kind).is_some() || of(unknown.kind).is_some());
-    let value = |kind: UnknownKind| known(kind).map_or(0.0, |place| fitted.point.values_si[place]);
-    let values: Vec<f64> = wider.unknowns.iter().map(|unknown| value(unknown.kind)).collect();
+    wider.unknowns.retain(|unknown| known(unknown.id).is_some() || of(unknown.id).is_some());
+    let value = |id: UnknownId| known(id).map_or(0.0, |place| fitted.point.values_si[place]);
+    let values: Vec<f64> = wider.unknowns.iter().map(|unknown| value(unknown.id)).collect();
     let Ok((slopes, _)) = wider.sensitivities(&values, scale) else { return columns };
     let width = values.len();
     for (place, unknown) in wider.unknowns.iter().enumerate() {
-        let Some(term) = of(unknown.kind).filter(|_| known(unknown.kind).is_none()) else { continue };
+        let Some(term) = of(unknown.id).filter(|_| known(unknown.id).is_none()) else { continue };
         let column = terms.iter().position(|other| *other == term).expect("it is one of them");
         for row in 0..rows {
             let slope = slopes[row * width + place];
