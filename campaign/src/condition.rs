@@ -8,7 +8,7 @@ use crate::factor::{Changes, FaultNumber, FileChoice, NONE_HIDDEN, Value};
 use crate::inputs::{CampaignInputs, RigFile, TextFile};
 use crate::points::{Point, Points};
 use axis_control::program::file::Source;
-use plant::effects::draw::{Among, EffectSampler};
+use plant::effects::draw::{AxisSelection, EffectSampler};
 use plant::effects::sheet;
 use plant::{Axis, RigParameters, Scene};
 use std::fmt::Write as _;
@@ -155,7 +155,7 @@ impl<'p> ValuesByTarget<'p> {
 }
 
 /// Paths and numbers of a hidden effect in a rig file; empty without an effect.
-fn hidden(name: &str, among: Among, seed: u64) -> Vec<(String, f64)> {
+fn hidden(name: &str, among: AxisSelection, seed: u64) -> Vec<(String, f64)> {
     let Some(sheet) = sheet(name).filter(|_| name != NONE_HIDDEN) else { return Vec::new() };
     let mut sampler = EffectSampler::new(seed);
     // The reader of the campaign file checked that the effect exists at such a place.

@@ -16,7 +16,7 @@
 //! Lists (`list = […]`) form a full factorial design; from `range = [least, most]` a value is drawn for each run, uniformly, or
 //! log-uniformly with `log = true`.
 
-use plant::effects::draw::Among;
+use plant::effects::draw::AxisSelection;
 use plant::effects::{SHEETS, sheet};
 use settings::{Section, SettingsError};
 use std::fmt;
@@ -41,7 +41,7 @@ pub(crate) enum Changes {
     /// A file as a whole.
     File(FileChoice),
     /// An effect of the rig that the controllers do not know, at one of these places.
-    Hidden(Among),
+    Hidden(AxisSelection),
     /// A value of a command, which receives it in its request.
     CommandValue,
 }
@@ -148,7 +148,8 @@ const CHOICES: [(&str, Option<FileChoice>); 5] = [
     ("load-program", Some(FileChoice::LoadProgram)),
     ("hidden", None),
 ];
-const AMONG: [(&str, Among); 3] = [("drive", Among::Drive), ("load", Among::Load), ("both", Among::Both)];
+const AMONG: [(&str, AxisSelection); 3] =
+    [("drive", AxisSelection::Drive), ("load", AxisSelection::Load), ("both", AxisSelection::Both)];
 
 /// The factor of a `[[vary]]`.
 pub(crate) fn read(section: &mut Section<'_>) -> Result<Factor, SettingsError> {

@@ -3,7 +3,7 @@
 use crate::event::{EventKind, of_outcome};
 use crate::faults::mark::Mark;
 use crate::faults::schedule::{FaultSchedule, FaultTargets};
-use plant::scene::{Action, HandForces, Holder, RigCall};
+use plant::scene::{Action, HandForces, RigCall, StopHolder};
 use plant::tables::CycleRecord;
 use plant::{AxisReadings, People, Plant, Sensors};
 use rig_node::{HandForceSource, PeopledPlant, RigCondition, SimulatedRig};
@@ -70,7 +70,7 @@ impl SimulatedRig for BreakableRig {
         self.peopled.rig_call(cycle)
     }
 
-    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<EventKind> {
+    fn emergency_stop(&mut self, holder: StopHolder, release: bool) -> Option<EventKind> {
         self.peopled.emergency_stop(holder, release).map(of_outcome)
     }
 

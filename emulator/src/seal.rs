@@ -5,7 +5,7 @@
 
 use crate::cli::{SealArguments, SealedAxis};
 use crate::run::RunError;
-use plant::effects::draw::{Among, as_toml, draw};
+use plant::effects::draw::{AxisSelection, as_toml, draw};
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
@@ -36,11 +36,11 @@ pub(crate) fn seal(arguments: &SealArguments) -> Result<String, RunError> {
     Ok(out.display().to_string())
 }
 
-fn among(axis: SealedAxis) -> Among {
+fn among(axis: SealedAxis) -> AxisSelection {
     match axis {
-        SealedAxis::Drive => Among::Drive,
-        SealedAxis::Load => Among::Load,
-        SealedAxis::Both => Among::Both,
+        SealedAxis::Drive => AxisSelection::Drive,
+        SealedAxis::Load => AxisSelection::Load,
+        SealedAxis::Both => AxisSelection::Both,
     }
 }
 
@@ -96,7 +96,7 @@ mod tests {
         let text = std::fs::read_to_string(&path).unwrap();
         assert!(text.starts_with("# SEALED: do not read on."), "{text}");
         let rig = RigParameters::baseline().with_effects_of(&text, "a.toml").unwrap();
-        assert_eq!(rig.effects(), draw(7, 3, Among::Both).unwrap());
+        assert_eq!(rig.effects(), draw(7, 3, AxisSelection::Both).unwrap());
         // Nothing else is left in the folder.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
     }

@@ -27,7 +27,7 @@ use crate::integrator::laws::Baseline;
 use crate::lanes::Pair;
 use crate::plant::Plant;
 use crate::state::Inputs;
-use columns::{Fixed, Moving, WIDTH};
+use columns::{HeldColumns, StateColumns, WIDTH};
 pub use substep::Registers;
 
 /// Plants that are moved together.
@@ -60,9 +60,9 @@ struct Group {
     /// Somebody may have changed a rig: who runs in lanes, and by which laws, is to be seen anew.
     stale: bool,
     in_lanes: [bool; WIDTH],
-    fixed: Box<Fixed>,
+    fixed: Box<HeldColumns>,
     /// The state before a substep, and after it.
-    moving: [Box<Moving>; 2],
+    states: [Box<StateColumns>; 2],
 }
 
 impl Batch {
@@ -137,8 +137,8 @@ impl Batch {
 
 impl Group {
     fn new() -> Self {
-        let moving = [Moving::new(), Moving::new()];
-        Group { stale: true, in_lanes: [false; WIDTH], fixed: Fixed::new(), moving }
+        let states = [StateColumns::new(), StateColumns::new()];
+        Group { stale: true, in_lanes: [false; WIDTH], fixed: HeldColumns::new(), states }
     }
 
     fn step(&mut self, registers: Registers, plants: &mut [Plant], inputs: &[Inputs]) {
@@ -149,7 +149,7 @@ impl Group {
             self.load(first, plants, inputs);
             self.advance(registers, first, plants);
             for (lane, plant) in plants.iter_mut().enumerate().filter(|(lane, _)| self.in_lanes[*lane]) {
-                let (lanes, supply_pa) = self.moving[0].get(lane);
+                let (lanes, supply_pa) = self.states[0].get(lane);
                 plant.go_to(&lanes, supply_pa);
             }
         }
@@ -181,10 +181,10 @@ impl Group {
 
     /// States and inputs into the columns.
     fn load(&mut self, first: usize, plants: &mut [Plant], inputs: &[Inputs]) {
-        let from = &mut self.moving[0];
+        let from = &mut self.states[0];
         for (lane, (plant, inputs)) in plants.iter_mut().zip(inputs).enumerate() {
             if self.in_lanes[lane] {
-                self.fixed.hold(lane, &plant.hold(inputs));
+                self.fixed.set_held(lane, &plant.held_inputs(inputs));
                 let state = plant.state();
                 from.set(lane, &Lanes::load(state), state.supply_pressure_pa);
             }
@@ -199,19 +199,19 @@ impl Group {
     fn advance(&mut self, registers: Registers, first: usize, plants: &[Plant]) {
         let like = &plants[first].integrator;
         for number in 0..like.substeps {
-            let [from, to] = &mut self.moving;
+            let [from, to] = &mut self.states;
             substep::substep(registers, like, &self.fixed, from, to);
             if to.has_corners() {
                 self.locate_corners(number, plants);
             }
-            self.moving.swap(0, 1);
+            self.states.swap(0, 1);
         }
     }
 
     /// Makes the substep of lanes that have a corner again, in parts, by their own rigs.
     #[cold]
     fn locate_corners(&mut self, substep: u32, plants: &[Plant]) {
-        let [from, to] = &mut self.moving;
+        let [from, to] = &mut self.states;
         for (lane, plant) in plants.iter().enumerate() {
             if self.in_lanes[lane] && to.corner(lane) {
                 let (lanes, held): ((Lanes<Pair>, f64), _) = (from.get(lane), self.fixed.held(lane));

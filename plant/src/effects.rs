@@ -34,7 +34,7 @@ use declared::{DeclaredTerms, Target};
 pub(crate) use friction::Friction;
 pub(crate) use replaced::{dead_volumes_m3, linkage};
 pub(crate) use sheet::OpenBalance;
-use sheet::{Effect, Element, Law, Part, Place, PlaceKind, Sheet, Switched};
+use sheet::{ActiveEffect, Effect, Element, Law, Part, Place, PlaceKind, Sheet};
 use tabulated::{Balance, Tables};
 pub(crate) use terms::Term;
 pub use terms::Terms;
@@ -92,7 +92,7 @@ macro_rules! catalogue {
         const ALL_SHEETS: &[Sheet] = &[$($(#[$when])* $type::SHEET),*];
 
         impl AxisEffects {
-            fn switch_on(&mut self, switched: &Switched, numbers: &[f64], rig: &RigParameters) {
+            fn switch_on(&mut self, switched: &ActiveEffect, numbers: &[f64], rig: &RigParameters) {
                 $($(#[$when])*
                 if switched.name == $type::SHEET.name {
                     at!(self.$module, switched.place.element, $kind) = Some($type::new(numbers, rig));

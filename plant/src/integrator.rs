@@ -25,13 +25,13 @@ mod smooth;
 use crate::chamber::{Air, Chambers, FlowLag};
 use crate::faults::Faults;
 use crate::lanes::{Axes, Choice, Mask, Pair};
-use crate::linkage::{Approach, Linkage};
+use crate::linkage::{ContactKinematics, Linkage};
 use crate::motion::{Motion, MotionSpan, Place};
 use crate::parameters::RigParameters;
 use crate::state::{AxisState, State};
 use crate::supply::{Supply, SupplyDecay};
 use crate::valve::Valve;
-use laws::{At, Laws};
+use laws::{Laws, StepContext};
 
 /// One step of [`crate::Plant`], s.
 pub const PERIOD_S: f64 = 1e-3;
@@ -82,9 +82,9 @@ pub(crate) struct Lanes<P = Pair> {
     pub(crate) air_b: Air<P>,
 }
 
-/// What is held over a period.
+/// Inputs and flags that are held over a period.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Held<P = Pair> {
+pub(crate) struct HeldInputs<P = Pair> {
     /// Valve commands as they act.
     pub(crate) command: P,
     /// Hand forces in each axis' own extension, N.
@@ -175,19 +175,19 @@ impl Integrator {
     }
 
     /// Advances the state by one period under these laws.
-    pub(crate) fn advance<L: Laws>(&self, laws: &mut L, state: &mut State, held: Held) {
+    pub(crate) fn advance<L: Laws>(&self, laws: &mut L, state: &mut State, held: HeldInputs) {
         let mut lanes = Lanes::load(state);
         let mut supply_pa = state.supply_pressure_pa;
         for substep in 0..self.substeps {
-            let mut carried = laws.carried();
-            let (next, corner) = self.substep(laws, (&lanes, supply_pa), held, substep, &mut carried);
+            let mut extra_state = laws.extra_state();
+            let (next, corner) = self.substep(laws, (&lanes, supply_pa), held, substep, &mut extra_state);
             (lanes, supply_pa) = if corner {
-                carried = laws.carried();
-                self.in_parts(laws, (lanes, supply_pa), held, substep, &mut carried)
+                extra_state = laws.extra_state();
+                self.in_parts(laws, (lanes, supply_pa), held, substep, &mut extra_state)
             } else {
                 next
             };
-            laws.keep(self, held, &lanes, &carried);
+            laws.keep(self, held, &lanes, &extra_state);
         }
         lanes.store(state);
         state.supply_pressure_pa = supply_pa;
@@ -199,14 +199,14 @@ impl Integrator {
         &self,
         laws: &L,
         (mut lanes, mut supply_pa): (Lanes, f64),
-        held: Held,
+        held: HeldInputs,
         substep: u32,
-        carried: &mut L::Carried,
+        extra_state: &mut L::ExtraState,
     ) -> (Lanes, f64) {
         for part in 0..PARTS {
             let node = self.node(&self.fine, supply_pa, held.stopped);
-            let at = At { of: self, span: &self.fine, from: &lanes, node, held, substep, part };
-            lanes = self.careful(laws, at, carried);
+            let step = StepContext { of: self, span: &self.fine, from: &lanes, node, held, substep, part };
+            lanes = self.careful(laws, step, extra_state);
             supply_pa = node.end_pa;
         }
         (lanes, supply_pa)
@@ -223,36 +223,37 @@ impl Integrator {
 
     /// A short step that may meet any corner.
     #[cold]
-    fn careful<L: Laws>(&self, laws: &L, at: At<'_>, carried: &mut L::Carried) -> Lanes {
-        let (span, node, held) = (at.span, at.node, at.held);
-        let from = at.from.with_check_valves(node.shut);
-        let at = At { from: &from, ..at };
-        let middle = laws.middle(at, carried);
+    fn careful<L: Laws>(&self, laws: &L, step: StepContext<'_>, extra_state: &mut L::ExtraState) -> Lanes {
+        let (span, node, held) = (step.span, step.node, step.held);
+        let from = step.from.with_check_valves(node.shut);
+        let step = StepContext { from: &from, ..step };
+        let middle = laws.middle(step, extra_state);
         let zero = Pair::both(0.0);
-        let moving = laws.moving(at);
-        let hand = laws.outside(at, &middle);
+        let moving = laws.moving(step);
+        let hand = laws.outside(step, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
             hand,
-            sliding_friction: laws.sliding(at, &middle, carried, middle.pneumatic + hand, moving),
+            sliding_friction: laws.sliding(step, &middle, extra_state, middle.pneumatic + hand, moving),
             contact: zero,
         };
         if held.linked {
-            let [to_middle, _] = laws.ways(at);
+            let [to_middle, _] = laws.ways(step);
             // First as if what rests stays; then again with what the contact sets in motion.
-            forces.contact = Pair::both(self.contact(self.approach(span, to_middle, &from, moving, &forces)));
+            forces.contact =
+                Pair::both(self.contact(self.kinematics(span, to_middle, &from, moving, &forces)));
             let resting_force = forces.pneumatic + forces.hand + forces.contact;
-            let starts = self.starting(laws, at, &middle, resting_force, moving);
+            let starts = self.starting(laws, step, &middle, resting_force, moving);
             if starts.any() {
                 forces.sliding_friction =
-                    forces.sliding_friction + laws.starting(at, &middle, resting_force, starts);
+                    forces.sliding_friction + laws.starting(step, &middle, resting_force, starts);
                 forces.contact = zero;
-                let approach = self.approach(span, to_middle, &from, moving | starts, &forces);
-                forces.contact = Pair::both(self.contact(approach));
+                let kinematics = self.kinematics(span, to_middle, &from, moving | starts, &forces);
+                forces.contact = Pair::both(self.contact(kinematics));
             }
         }
         let force = forces.pneumatic + forces.hand + forces.contact;
-        let mut place = |axis: usize| laws.advance(at, &middle, carried, axis, force.to_array()[axis]);
+        let mut place = |axis: usize| laws.advance(step, &middle, extra_state, axis, force.to_array()[axis]);
         let (drive, load) = (place(0), place(1));
         let extension = Pair::new(drive.extension, load.extension);
         let velocity = Pair::new(drive.velocity, load.velocity);
@@ -265,25 +266,32 @@ impl Integrator {
         let mut next = Lanes {
             extension,
             velocity,
-            spool: laws.spool(at, carried),
+            spool: laws.spool(step, extra_state),
             air_a: bounded(from.air_a, middle.edge_flow[0], Chambers::volume_a),
             air_b: bounded(from.air_b, middle.edge_flow[1], Chambers::volume_b),
         };
-        laws.air(at, &mut next, &middle, carried);
+        laws.air(step, &mut next, &middle, extra_state);
         next
     }
 
-    fn contact(&self, approach: Approach) -> f64 {
-        if self.linkage.overlap(approach.distance_m) == 0.0 {
-            self.linkage.closing_force(approach)
+    fn contact(&self, kinematics: ContactKinematics) -> f64 {
+        if self.linkage.overlap(kinematics.distance_m) == 0.0 {
+            self.linkage.closing_force(kinematics)
         } else {
-            self.linkage.midpoint_force(approach)
+            self.linkage.midpoint_force(kinematics)
         }
     }
 
     /// Which resting axes this force sets in motion.
-    fn starting<L: Laws>(&self, laws: &L, at: At<'_>, middle: &Middle, force: Pair, moving: Mask) -> Mask {
-        let leaves = |axis: usize| !laws.holds(at, middle, axis, force.to_array()[axis]);
+    fn starting<L: Laws>(
+        &self,
+        laws: &L,
+        step: StepContext<'_>,
+        middle: &Middle,
+        force: Pair,
+        moving: Mask,
+    ) -> Mask {
+        let leaves = |axis: usize| !laws.holds(step, middle, axis, force.to_array()[axis]);
         Mask::new([leaves(0), leaves(1)]) & !moving
     }
 }

@@ -28,9 +28,9 @@ pub(crate) struct Linkage {
     damping_n_s_per_m: f64,
 }
 
-/// How the two rods lie to each other, and how a force would part them.
+/// Relative position and motion of the two rods in a step, and their response to a contact force.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Approach {
+pub(crate) struct ContactKinematics {
     /// d, m.
     pub(crate) distance_m: f64,
     /// dd/dt at the step's midpoint without contact, m/s.
@@ -83,28 +83,28 @@ impl Linkage {
 
     /// F_c at the midpoint of a step that starts in contact, N; 0 if it starts in the gap.
     #[inline(always)]
-    pub(crate) fn midpoint_force(&self, approach: Approach) -> f64 {
-        let overlap = self.overlap(approach.distance_m);
+    pub(crate) fn midpoint_force(&self, kinematics: ContactKinematics) -> f64 {
+        let overlap = self.overlap(kinematics.distance_m);
         if overlap == 0.0 {
             return 0.0;
         }
-        let reach = self.stiffness_n_per_m * approach.half_span_s + self.damping_n_s_per_m;
-        let free = self.stiffness_n_per_m * overlap + reach * approach.free_speed_m_per_s;
-        pushing(overlap, free / (1.0 + reach * approach.mobility))
+        let reach = self.stiffness_n_per_m * kinematics.half_span_s + self.damping_n_s_per_m;
+        let free = self.stiffness_n_per_m * overlap + reach * kinematics.free_speed_m_per_s;
+        pushing(overlap, free / (1.0 + reach * kinematics.mobility))
     }
 
     /// Mean F_c over a step that starts in the gap and may make contact before its end, N.
     ///
     /// The contact lasts for the share of the step that is left when the free motion reaches the gap's edge.
-    pub(crate) fn closing_force(&self, approach: Approach) -> f64 {
-        let span_s = 2.0 * approach.half_span_s;
-        let beyond = self.overlap(approach.distance_m + span_s * approach.free_speed_m_per_s);
+    pub(crate) fn closing_force(&self, kinematics: ContactKinematics) -> f64 {
+        let span_s = 2.0 * kinematics.half_span_s;
+        let beyond = self.overlap(kinematics.distance_m + span_s * kinematics.free_speed_m_per_s);
         if beyond == 0.0 {
             return 0.0;
         }
-        let share = (beyond / (span_s * approach.free_speed_m_per_s)).min(1.0);
-        let reach = self.stiffness_n_per_m * share * approach.half_span_s + self.damping_n_s_per_m;
-        share * reach * approach.free_speed_m_per_s / (1.0 + share * share * reach * approach.mobility)
+        let share = (beyond / (span_s * kinematics.free_speed_m_per_s)).min(1.0);
+        let reach = self.stiffness_n_per_m * share * kinematics.half_span_s + self.damping_n_s_per_m;
+        share * reach * kinematics.free_speed_m_per_s / (1.0 + share * share * reach * kinematics.mobility)
     }
 
     /// Whether a step from one distance to another made contact, on the other side too.
@@ -148,18 +148,26 @@ mod tests {
     fn contact_never_pulls() {
         assert_eq!(linkage().force(1.1e-4, -1.0), 0.0);
         assert_eq!(linkage().force(-1.1e-4, 1.0), 0.0);
-        let parting =
-            Approach { distance_m: 1.1e-4, free_speed_m_per_s: -1.0, mobility: 1e-5, half_span_s: 5e-5 };
+        let parting = ContactKinematics {
+            distance_m: 1.1e-4,
+            free_speed_m_per_s: -1.0,
+            mobility: 1e-5,
+            half_span_s: 5e-5,
+        };
         assert_eq!(linkage().midpoint_force(parting), 0.0);
     }
 
     #[test]
     fn the_midpoint_force_satisfies_its_own_equation() {
-        let approach =
-            Approach { distance_m: -1.2e-4, free_speed_m_per_s: -0.05, mobility: 4e-5, half_span_s: 5e-5 };
-        let force = linkage().midpoint_force(approach);
-        let speed = approach.free_speed_m_per_s - approach.mobility * force;
-        let implied = 2e6 * (-0.2e-4 + approach.half_span_s * speed) + 2e3 * speed;
+        let kinematics = ContactKinematics {
+            distance_m: -1.2e-4,
+            free_speed_m_per_s: -0.05,
+            mobility: 4e-5,
+            half_span_s: 5e-5,
+        };
+        let force = linkage().midpoint_force(kinematics);
+        let speed = kinematics.free_speed_m_per_s - kinematics.mobility * force;
+        let implied = 2e6 * (-0.2e-4 + kinematics.half_span_s * speed) + 2e3 * speed;
         // Sums of some hundred newton, few roundings.
         assert!((implied - force).abs() < 1e-9, "{implied} {force}");
     }
@@ -168,9 +176,9 @@ mod tests {
     fn closing_in_the_last_instant_of_a_step_is_felt_for_that_instant() {
         let speed = 0.1;
         let at = |distance_m| {
-            let approach =
-                Approach { distance_m, free_speed_m_per_s: speed, mobility: 0.0, half_span_s: 5e-6 };
-            linkage().closing_force(approach)
+            let kinematics =
+                ContactKinematics { distance_m, free_speed_m_per_s: speed, mobility: 0.0, half_span_s: 5e-6 };
+            linkage().closing_force(kinematics)
         };
         assert_eq!(at(0.98e-4), 0.0, "2 um are more than 10 us at 0.1 m/s");
         // Half of the step in contact: half of 200 N, and 0.25 um of mean overlap for half of the time.

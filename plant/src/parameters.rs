@@ -28,7 +28,7 @@ pub use declared::{suspects, suspects_using};
 pub use laws::{Law, LawNumber, LawVariable, Laws};
 
 use crate::effects::declared::Declared;
-use crate::effects::sheet::{Place, Switched};
+use crate::effects::sheet::{ActiveEffect, Place};
 use crate::effects::tabulated::Tabulated;
 
 /// The numbers of one rig; made from a rig file, or the shipped baseline.
@@ -206,7 +206,7 @@ impl RigParameters {
 
     /// The effects that are switched on, in the order of the catalogue.
     #[must_use]
-    pub fn effects(&self) -> &[Switched] {
+    pub fn effects(&self) -> &[ActiveEffect] {
         &self.entries.effects
     }
 

@@ -5,11 +5,11 @@
 
 use std::sync::Arc;
 
-use crate::effects::tabulated::Seen;
+use crate::effects::tabulated::AxisConditions;
 use crate::effects::{Effects, Term, Terms};
 use crate::faults::{AxisFaults, Faults, ValvesAtWork};
 use crate::integrator::laws::Baseline;
-use crate::integrator::{Held, Integrator, Lanes, SUBSTEPS};
+use crate::integrator::{HeldInputs, Integrator, Lanes, SUBSTEPS};
 use crate::lanes::{Axes, Pair};
 use crate::parameters::RigParameters;
 use crate::setup::{Setup, SetupError, check_added_mass, check_state, start_state};
@@ -70,7 +70,7 @@ impl Plant {
     /// [`SetupError`] if the state is none that the rig can be in; the plant is as before.
     pub fn go_on_in(&mut self, state: &State) -> Result<(), SetupError> {
         check_state(&self.rig, state)?;
-        let before = self.effects.is_some().then(|| seen(&self.truth(&Inputs::default())));
+        let before = self.effects.is_some().then(|| sensor_inputs(&self.truth(&Inputs::default())));
         if let Some(effects) = &mut self.effects {
             effects.memory.keep_temperatures(&self.state, state);
         }
@@ -80,9 +80,9 @@ impl Plant {
             self.set_added_mass_kg(state.added_mass_kg)?;
         }
         if let Some(before) = before {
-            let now = seen(&self.truth(&Inputs::default()));
+            let now = sensor_inputs(&self.truth(&Inputs::default()));
             let effects = self.effects.as_mut().expect("there were some before");
-            effects.memory.move_seen(before, now);
+            effects.memory.shift_sensor_histories(before, now);
             effects.memory.sensor_force_n = now.map(|[_, force_n, ..]| force_n);
         }
         Ok(())
@@ -121,7 +121,7 @@ impl Plant {
     /// # Panics
     /// In debug builds, if a command is not in [-1, 1] or a hand's force not finite: a bug of the caller.
     pub fn step(&mut self, inputs: &Inputs) {
-        let held = self.hold(inputs);
+        let held = self.held_inputs(inputs);
         match &mut self.effects {
             Some(effects) if !effects.baseline_laws => {
                 effects.begin_period(held.command.to_array());
@@ -133,7 +133,7 @@ impl Plant {
 
     /// What is held over a period with these inputs; a slow valve goes on by that period.
     #[inline(always)]
-    pub(crate) fn hold(&mut self, inputs: &Inputs) -> Held {
+    pub(crate) fn held_inputs(&mut self, inputs: &Inputs) -> HeldInputs {
         debug_assert!(inputs.valve.iter().all(|u| (-1.0..=1.0).contains(u)), "{inputs:?}");
         debug_assert!(
             inputs.hand_force_carriage_n.is_finite() && inputs.hand_force_load_n.is_finite(),
@@ -151,7 +151,7 @@ impl Plant {
             (passed, stuck) = self.valves.pass(command.to_array(), spools);
             command = Pair::new(passed[0], passed[1]);
         }
-        Held {
+        HeldInputs {
             command,
             hand: hand_forces(inputs),
             stopped: self.state.emergency_stop,
@@ -179,17 +179,17 @@ impl Plant {
     /// What the sensors would show at this instant without noise and steps: position, force, pressure a, pressure b of each axis.
     pub fn shown(&self, truth: &Truth) -> [[f64; 4]; 2] {
         let Some(effects) = &self.effects else {
-            return seen(truth);
+            return sensor_inputs(truth);
         };
         std::array::from_fn(|i| {
             let axis = &truth.axes[i];
-            let seen = Seen {
+            let conditions = AxisConditions {
                 extension_m: self.state.axes[i].extension_m,
                 velocity_m_per_s: axis.rod_velocity_m_per_s,
                 spool: axis.spool,
                 pressure_pa: [axis.pressure_a_pa, axis.pressure_b_pa],
             };
-            let at = effects.declared_at(i, &seen, axis.sensor_force_n);
+            let at = effects.declared_at(i, &conditions, axis.sensor_force_n);
             let pressure = |chamber, truth| effects.pressure_reading(i, chamber, truth, &at).sum(truth);
             [
                 effects.position_reading(i, axis.position_m, &at).sum(axis.position_m),
@@ -329,6 +329,6 @@ impl Plant {
 }
 
 /// What flawless sensors see: position, force, pressure a, pressure b of each axis.
-fn seen(truth: &Truth) -> [[f64; 4]; 2] {
+fn sensor_inputs(truth: &Truth) -> [[f64; 4]; 2] {
     truth.axes.map(|axis| [axis.position_m, axis.sensor_force_n, axis.pressure_a_pa, axis.pressure_b_pa])
 }

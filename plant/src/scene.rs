@@ -57,13 +57,13 @@ use crate::plant::Plant;
 use crate::setup::Setup;
 
 pub use hand::{
-    Arm, DEFAULT_DAMPING_N_S_PER_M, DEFAULT_MOST_N, DEFAULT_RAMP_S, DEFAULT_STIFFNESS_N_PER_M,
-    DEFAULT_TRAVEL_S, Hand, HandForces, Part,
+    DEFAULT_DAMPING_N_S_PER_M, DEFAULT_MOST_N, DEFAULT_RAMP_S, DEFAULT_STIFFNESS_N_PER_M, DEFAULT_TRAVEL_S,
+    Hand, HandAction, HandForces, Part,
 };
 pub use people::{Outcome, People, Script};
 /// Why the `[rig]` of an experiment is refused: file, line, key, value and what is allowed.
 pub use settings::SettingsError as SceneError;
-pub use stop::{Holder, Holders, REPEAT_CYCLES, RigCall};
+pub use stop::{REPEAT_CYCLES, RigCall, StopHolder, StopHolders};
 
 /// `[rig]` of an experiment: the rig's setup, and what people do to it while it runs.
 #[derive(Debug, Clone, PartialEq, Serialize)]

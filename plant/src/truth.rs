@@ -13,7 +13,7 @@
 //!
 //! Source: rig-model.md, One axis, Masses and linkage.
 
-use crate::effects::tabulated::Seen;
+use crate::effects::tabulated::AxisConditions;
 use crate::effects::{Effects, Friction};
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
@@ -169,7 +169,7 @@ impl Truth {
 /// Absolute pressure behind the supply edges, Pa.
 pub(crate) fn supply_pressure_pa(effects: Option<&Effects>, state: &State) -> f64 {
     effects.map_or(state.supply_pressure_pa, |effects| {
-        effects.supply_side(&effects.memory.moving).sum(state.supply_pressure_pa)
+        effects.supply_side(&effects.memory.states).sum(state.supply_pressure_pa)
     })
 }
 
@@ -267,7 +267,7 @@ impl TrueForces {
             let place = lanes.place(i);
             let hand_n = hand.to_array()[i];
             let effect_n =
-                effects.map_or(0.0, |effects| effects.force(i, &Seen::at(lanes, &air, i)).sum(0.0));
+                effects.map_or(0.0, |effects| effects.force(i, &AxisConditions::at(lanes, &air, i)).sum(0.0));
             let force = pneumatic[i] + hand_n + contact_n + effect_n;
             let friction = effects.map(|effects| Friction::at(effects, integrator, i, place, &air));
             let levels = friction.map_or(motion.levels, |friction| friction.levels(place.velocity.abs()));

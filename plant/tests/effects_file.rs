@@ -2,7 +2,7 @@
 
 use plant::RigParameters;
 use plant::effects::SHEETS;
-use plant::effects::sheet::{EffectKey, Place, Sheet, Switched};
+use plant::effects::sheet::{ActiveEffect, EffectKey, Place, Sheet};
 
 /// The shipped file with lines at its end; they start at [`first_line`].
 fn with(lines: &str) -> String {
@@ -24,7 +24,7 @@ fn inside(key: &EffectKey) -> f64 {
     key.min + 0.37 * (key.max - key.min)
 }
 
-fn read(text: &str) -> Vec<Switched> {
+fn read(text: &str) -> Vec<ActiveEffect> {
     RigParameters::from_toml(text, "rig.toml").unwrap_or_else(|error| panic!("{error}")).effects().to_vec()
 }
 
@@ -46,7 +46,7 @@ fn each_effect_is_switched_on_at_each_place_of_its_kind() {
         for place in sheet.place.places() {
             let numbers: Vec<f64> = sheet.keys.iter().map(inside).collect();
             let effects = read(&with(&table(sheet, *place, &numbers)));
-            assert_eq!(effects, [Switched { name: sheet.name, place: *place, numbers }]);
+            assert_eq!(effects, [ActiveEffect { name: sheet.name, place: *place, numbers }]);
         }
     }
 }
@@ -274,7 +274,7 @@ fn all_effects_together_stand_in_the_catalogues_order_whatever_the_files() {
         .map(|(sheet, place)| table(sheet, place, &sheet.keys.iter().map(inside).collect::<Vec<_>>()))
         .collect();
     let effects = read(&with(&text));
-    let row = |effect: &Switched| SHEETS.iter().position(|sheet| sheet.name == effect.name);
+    let row = |effect: &ActiveEffect| SHEETS.iter().position(|sheet| sheet.name == effect.name);
     let order: Vec<(Option<usize>, Place)> =
         effects.iter().map(|effect| (row(effect), effect.place)).collect();
     assert!(order.is_sorted(), "{order:?}");

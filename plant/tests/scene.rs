@@ -1,6 +1,6 @@
 //! People at the rig: what an experiment's `[rig]` may say, and what hands and buttons do to a plant.
 
-use plant::scene::{Action, Arm, DEFAULT_MOST_N, HandForces, Outcome};
+use plant::scene::{Action, DEFAULT_MOST_N, HandAction, HandForces, Outcome};
 use plant::{Inputs, People, Plant, RigParameters, Scene, SceneError, State};
 
 fn scene(text: &str) -> Scene {
@@ -12,7 +12,7 @@ fn refused(text: &str) -> SceneError {
 }
 
 /// What a scene comes to.
-struct Played {
+struct PlayedScene {
     /// Plant at the start of each cycle, with the scripted forces over it.
     course: Vec<(State, HandForces)>,
     reported: Vec<(u64, Outcome)>,
@@ -20,7 +20,7 @@ struct Played {
 }
 
 /// Plays a scene for so many cycles with these valve commands.
-fn play(scene: &Scene, cycles: u64, valve: impl Fn(u64) -> [f64; 2]) -> Played {
+fn play(scene: &Scene, cycles: u64, valve: impl Fn(u64) -> [f64; 2]) -> PlayedScene {
     let mut plant = Plant::new(&RigParameters::baseline(), &scene.setup()).expect("a checked setup");
     let mut people = People::new(scene);
     let (mut course, mut reported) = (Vec::new(), Vec::new());
@@ -31,7 +31,7 @@ fn play(scene: &Scene, cycles: u64, valve: impl Fn(u64) -> [f64; 2]) -> Played {
         forces.put_into(&mut inputs);
         plant.step(&inputs);
     }
-    Played { course, reported, plant }
+    PlayedScene { course, reported, plant }
 }
 
 fn shut(_: u64) -> [f64; 2] {
@@ -75,8 +75,10 @@ fn defaults_of_hands_and_events_are_filled_in() {
          [[rig.hand]]\non = \"load-eye\"\nfrom_s = 1.0\nto_s = 1.5\nguide_to_m = 0.3\n\
          [[rig.event]]\nat_s = 2\ndo = \"weights\"\nadded_mass_kg = 5\n[[rig.event]]\nat_s = 1\ndo = \"link\"\n",
     );
-    assert_eq!(read.hand[0].arm, Arm::Push { force_n: 60.0, ramp_s: 0.05 });
-    let Arm::Guide { travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n, .. } = read.hand[1].arm else {
+    assert_eq!(read.hand[0].action, HandAction::Push { force_n: 60.0, ramp_s: 0.05 });
+    let HandAction::Guide { travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n, .. } =
+        read.hand[1].action
+    else {
         panic!("{:?}", read.hand[1]);
     };
     // A hand that is on for half a second travels no longer.
@@ -231,7 +233,7 @@ fn events_act_in_their_cycle_in_the_order_of_their_times() {
 }
 
 /// The load passes the carriage at 0.3 m, and the pin is wiggled until `until_s`.
-fn passing(until_s: f64) -> Played {
+fn passing(until_s: f64) -> PlayedScene {
     let text = format!(
         "[rig]\ncarriage_position_m = 0.3\n[[rig.event]]\nat_s = 0.2\ndo = \"link\"\nuntil_s = {until_s}\n"
     );

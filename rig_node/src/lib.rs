@@ -18,7 +18,7 @@ mod telegrams;
 pub use rig::{HandForceSource, PeopledPlant, RigCondition, SimulatedRig};
 pub use telegrams::TickCause;
 
-use plant::scene::Holder;
+use plant::scene::StopHolder;
 use plant::{Axis, AxisReadings};
 use protocol::commands::{Change, CommandIntake};
 use protocol::frames::{EmergencyStop, Frame, ValveCommand};
@@ -130,9 +130,9 @@ impl<R: SimulatedRig> RigNode<R> {
         match frame {
             Frame::DriveValveCommand(command) => self.take_command(Axis::Drive, command),
             Frame::LoadValveCommand(command) => self.take_command(Axis::Load, command),
-            Frame::ConsoleEmergencyStop(stop) => self.obey(Holder::Console, stop, on_event),
-            Frame::DriveEmergencyStop(stop) => self.obey(Holder::Drive, stop, on_event),
-            Frame::LoadEmergencyStop(stop) => self.obey(Holder::Load, stop, on_event),
+            Frame::ConsoleEmergencyStop(stop) => self.obey(StopHolder::Console, stop, on_event),
+            Frame::DriveEmergencyStop(stop) => self.obey(StopHolder::Drive, stop, on_event),
+            Frame::LoadEmergencyStop(stop) => self.obey(StopHolder::Load, stop, on_event),
             other => FrameOutcome::Unhandled(other),
         }
     }
@@ -144,7 +144,7 @@ impl<R: SimulatedRig> RigNode<R> {
 
     fn obey(
         &mut self,
-        holder: Holder,
+        holder: StopHolder,
         stop: EmergencyStop,
         on_event: &mut dyn FnMut(R::Event),
     ) -> FrameOutcome {

@@ -1,6 +1,6 @@
 //! The simulated rig that a node moves, and the plant with people around it.
 
-use plant::scene::{Action, HandForces, Holder, Outcome, RigCall};
+use plant::scene::{Action, HandForces, Outcome, RigCall, StopHolder};
 use plant::tables::CycleRecord;
 use plant::{AxisReadings, Inputs, People, Plant, Sensors};
 
@@ -22,7 +22,7 @@ pub trait SimulatedRig {
     fn rig_call(&mut self, cycle: u64) -> Option<RigCall>;
 
     /// Takes note of a stop or a release by a controller or the console.
-    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Self::Event>;
+    fn emergency_stop(&mut self, holder: StopHolder, release: bool) -> Option<Self::Event>;
 
     /// State of the rig that its status reports.
     fn condition(&self) -> RigCondition;
@@ -130,7 +130,7 @@ impl SimulatedRig for PeopledPlant {
         self.people.rig_call(cycle)
     }
 
-    fn emergency_stop(&mut self, holder: Holder, release: bool) -> Option<Outcome> {
+    fn emergency_stop(&mut self, holder: StopHolder, release: bool) -> Option<Outcome> {
         self.people.emergency_stop(holder, release, &mut self.plant)
     }
 

@@ -6,8 +6,8 @@ use crate::records::{Table, count, json};
 use crate::scene::Scene;
 use plant::Truth;
 use plant::effects::SHEETS;
-use plant::effects::draw::{Among, as_toml, draw};
-use plant::effects::sheet::{EffectKey, Sheet, Switched};
+use plant::effects::draw::{AxisSelection, as_toml, draw};
+use plant::effects::sheet::{ActiveEffect, EffectKey, Sheet};
 use std::path::{Path, PathBuf};
 
 const PERIOD_NS: f64 = 1e6;
@@ -28,7 +28,7 @@ pub enum Extreme {
 }
 
 /// Every effect at each of its places, at the end of its range.
-pub fn everything(extreme: Extreme) -> Vec<Switched> {
+pub fn everything(extreme: Extreme) -> Vec<ActiveEffect> {
     let mut turn = false;
     let mut number = |key: &EffectKey| {
         turn = !turn;
@@ -44,15 +44,15 @@ pub fn everything(extreme: Extreme) -> Vec<Switched> {
     for sheet in SHEETS {
         for place in sheet.place.places() {
             let numbers = sheet.keys.iter().map(&mut number).collect();
-            effects.push(Switched { name: sheet.name, place: *place, numbers });
+            effects.push(ActiveEffect { name: sheet.name, place: *place, numbers });
         }
     }
     effects
 }
 
 /// Each effect once: at the largest number that is drawn of its amplitude, its other keys at their defaults.
-pub fn each_alone() -> Vec<Switched> {
-    let alone = |sheet: &Sheet| Switched {
+pub fn each_alone() -> Vec<ActiveEffect> {
+    let alone = |sheet: &Sheet| ActiveEffect {
         name: sheet.name,
         place: sheet.place.places()[0],
         numbers: sheet
@@ -66,12 +66,12 @@ pub fn each_alone() -> Vec<Switched> {
 }
 
 /// So many different effects, drawn from this seed.
-pub fn drawn(seed: u64, count: usize) -> Vec<Switched> {
-    draw(seed, count, Among::Both).expect("the catalogue has so many")
+pub fn drawn(seed: u64, count: usize) -> Vec<ActiveEffect> {
+    draw(seed, count, AxisSelection::Both).expect("the catalogue has so many")
 }
 
 /// The shipped rig file with these effects, as `rig-effects.toml` of the scene.
-pub fn rig_with(scene: &Scene, effects: &[Switched]) -> PathBuf {
+pub fn rig_with(scene: &Scene, effects: &[ActiveEffect]) -> PathBuf {
     let rig = std::fs::read_to_string(scene.path("rig.toml")).expect("the rig file is there");
     scene.write("rig-effects.toml", &format!("{rig}\n{}", as_toml(effects)))
 }
@@ -92,7 +92,7 @@ pub struct LoopTiming {
 }
 
 /// Runs emulator and controllers in real time with these effects; the run lies in the folder `run` of the scene.
-pub fn live(scene: &Scene, effects: &[Switched], seconds: u32) -> LoopTiming {
+pub fn live(scene: &Scene, effects: &[ActiveEffect], seconds: u32) -> LoopTiming {
     let rig = rig_with(scene, effects);
     let folder = scene.path("run");
     let options = format!("--seconds {seconds} --full-timing --no-flight");

@@ -5,7 +5,7 @@
 //! sum of a balance changes by exactly an effect's term is held in `plant`.
 
 use plant::effects::SHEETS;
-use plant::effects::sheet::Switched;
+use plant::effects::sheet::ActiveEffect;
 use std::sync::Mutex;
 use std::thread;
 use system_tests::hidden::{
@@ -18,7 +18,7 @@ const SECONDS: u32 = 2;
 const ROUNDS: usize = 3;
 
 /// A run in lockstep with these effects, held against what every run must be.
-fn lockstep(effects: &[Switched]) {
+fn lockstep(effects: &[ActiveEffect]) {
     let scene = Scene::new(LIVELY);
     let rig = rig_with(&scene, effects);
     run_both(
@@ -62,7 +62,7 @@ fn ten_effects_at_random_and_all_at_their_extremes_leave_the_rig_finite_in_locks
 }
 
 /// Slices with and without effects in turns, so that what disturbs the machine disturbs both; the sums of each.
-fn in_turns(effects: &[Switched]) -> [LoopTiming; 2] {
+fn in_turns(effects: &[ActiveEffect]) -> [LoopTiming; 2] {
     let mut sums = [LoopTiming::default(); 2];
     for _ in 0..ROUNDS {
         for (sum, effects) in sums.iter_mut().zip([&[][..], effects]) {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 
 use memchr::memmem;
 use plant::effects::draw::as_toml;
-use plant::effects::sheet::Switched;
+use plant::effects::sheet::ActiveEffect;
 use plant::effects::{SHEETS, sheet};
 use protocol::frames::{DRIVE_SENSORS, MESSAGES};
 use system_tests::hidden::{Extreme, LIVELY, drawn, everything, rig_with};
@@ -96,7 +96,7 @@ fn census(outputs: &BTreeMap<String, String>, words: &BTreeSet<String>) -> BTree
 }
 
 /// The beginnings of the texts of its numbers, in the file's unit and in SI, that do not stand anywhere by chance.
-fn telling_numbers(effects: &[Switched]) -> Vec<String> {
+fn telling_numbers(effects: &[ActiveEffect]) -> Vec<String> {
     let mut texts = Vec::new();
     for effect in effects {
         let keys = sheet(effect.name).expect("it was drawn from the sheets").keys;
@@ -202,11 +202,11 @@ fn a_sealed_effect_is_that_of_a_rig_file_and_wins_over_it_without_a_word() {
     let effects = drawn(5, 6);
     let open = lockstep(&scene, &rig_with(&scene, &effects), "open", "");
     scene.write("sealed.toml", &as_toml(&effects));
-    let other = |effect: &Switched| Switched {
+    let other = |effect: &ActiveEffect| ActiveEffect {
         numbers: sheet(effect.name).expect("a sheet").keys.iter().map(|key| key.drawn[0]).collect(),
         ..effect.clone()
     };
-    let others: Vec<Switched> = effects.iter().map(other).collect();
+    let others: Vec<ActiveEffect> = effects.iter().map(other).collect();
     let option = format!("--sealed {}", scene.path("sealed.toml").display());
     for (folder, rig) in [("plain", scene.path("rig.toml")), ("over", rig_with(&scene, &others))] {
         let sealed = lockstep(&scene, &rig, folder, &option);

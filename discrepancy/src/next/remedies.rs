@@ -4,55 +4,59 @@
 
 use super::Explanation;
 use plant::effects::sheet;
-use plant::effects::sheet::ByHand;
+use plant::effects::sheet::ManualMeasurement;
 
 /// Measurements that sheets of effects name, each with parameters that it discriminates too, and in words. The first that
 /// discriminates both sides of a pair counts.
-const REMEDIES: &[(ByHand, &[&str], &str)] = &[
+const REMEDIES: &[(ManualMeasurement, &[&str], &str)] = &[
     (
-        ByHand::Venting,
+        ManualMeasurement::Venting,
         &["parameter:supply-pressure", "parameter:piston-area"],
         "venting both chambers to the atmosphere, where the pressure is known, and a gauge at the supply",
     ),
     (
-        ByHand::Tilting,
+        ManualMeasurement::Tilting,
         &["parameter:sliding-friction"],
         "tilting the rig by a known angle: gravity along the rod changes with it, offsets of sensors and friction do not",
     ),
     (
-        ByHand::KnownWeight,
+        ManualMeasurement::KnownWeight,
         &["parameter:mass"],
         "uncoupling the rods and hanging a known weight on the force sensor",
     ),
     (
-        ByHand::PositionSensor,
+        ManualMeasurement::PositionSensor,
         &[],
         "a second position sensor without filter, or samples faster than 1 kHz: at 1 kHz a short lag is a delay",
     ),
     (
-        ByHand::PortPressure,
+        ManualMeasurement::PortPressure,
         &["parameter:flow-lag"],
         "a fast pressure sensor at the chamber's port beside the rig's own",
     ),
     (
-        ByHand::SpoolSignal,
+        ManualMeasurement::SpoolSignal,
         &["parameter:spool-time-constant", "parameter:flow-lag"],
         "the spool's own position signal, or steps of the valve on a locked piston",
     ),
     (
-        ByHand::LockedHold,
+        ManualMeasurement::LockedHold,
         &[],
         "locking the piston, shutting the supply, and holding for minutes with the valve's ports plugged",
     ),
     (
-        ByHand::ConstantVolume,
+        ManualMeasurement::ConstantVolume,
         &["parameter:kv-scale", "parameter:supply-pressure"],
         "locking the piston at several places and filling and venting a chamber at constant volume",
     ),
-    (ByHand::PressedEnds, &[], "pressing the piston against both ends by hand: the stroke is known"),
-    (ByHand::Uncoupling, &[], "uncoupling the rods: what stays is not the linkage"),
     (
-        ByHand::Pulling,
+        ManualMeasurement::PressedEnds,
+        &[],
+        "pressing the piston against both ends by hand: the stroke is known",
+    ),
+    (ManualMeasurement::Uncoupling, &[], "uncoupling the rods: what stays is not the linkage"),
+    (
+        ManualMeasurement::Pulling,
         &["parameter:viscous-friction", "parameter:sliding-friction", "parameter:break-away-force"],
         "uncoupling the rods and pulling the vented piston by hand with a force gauge",
     ),
@@ -80,8 +84,8 @@ pub(crate) fn of_pair(one: &[String], other: &[String]) -> &'static str {
         these.iter().filter(|name| !those.contains(name)).map(effect).collect()
     };
     let (left, right) = (only(one, other), only(other, one));
-    let knows = |(by, parameters, _): &(ByHand, &[&str], &str), side: &[String]| {
-        let of_sheet = |name: &str| sheet(name).is_some_and(|sheet| sheet.told_apart_by.contains(by));
+    let knows = |(by, parameters, _): &(ManualMeasurement, &[&str], &str), side: &[String]| {
+        let of_sheet = |name: &str| sheet(name).is_some_and(|sheet| sheet.distinguished_by.contains(by));
         !side.is_empty() && side.iter().all(|name| parameters.contains(&name.as_str()) || of_sheet(name))
     };
     let remedy = REMEDIES.iter().find(|remedy| knows(remedy, &left) && knows(remedy, &right));
@@ -95,8 +99,8 @@ mod tests {
 
     #[test]
     fn every_measurement_of_a_sheet_has_words_and_tells_several_apart() {
-        let named = |by| SHEETS.iter().filter(|sheet| sheet.told_apart_by.contains(by)).count();
-        for by in SHEETS.iter().flat_map(|sheet| sheet.told_apart_by) {
+        let named = |by| SHEETS.iter().filter(|sheet| sheet.distinguished_by.contains(by)).count();
+        for by in SHEETS.iter().flat_map(|sheet| sheet.distinguished_by) {
             assert!(REMEDIES.iter().any(|(measurement, ..)| measurement == by), "{by:?}");
         }
         for (by, parameters, _) in REMEDIES {

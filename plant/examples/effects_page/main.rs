@@ -93,7 +93,7 @@ fn main() -> std::io::Result<()> {
 }
 
 /// What was measured of an effect.
-struct Shown {
+struct MeasuredEffect {
     places: Vec<String>,
     conditions: [String; 2],
     /// Largest sizes of the four signals in the step, then in the slow stroke, in units of noise.
@@ -101,7 +101,7 @@ struct Shown {
     svg: String,
 }
 
-fn show(sheet: &Sheet, baseline: &RigParameters, noise: [f64; 4]) -> Shown {
+fn show(sheet: &Sheet, baseline: &RigParameters, noise: [f64; 4]) -> MeasuredEffect {
     let places: Vec<String> =
         sheet.place.names().into_iter().filter(|place| is_shown(sheet, place)).collect();
     let numbers: Vec<(&str, f64)> = sheet.keys.iter().map(|key| (key.name, middle(key))).collect();
@@ -137,7 +137,7 @@ fn show(sheet: &Sheet, baseline: &RigParameters, noise: [f64; 4]) -> Shown {
         }
     });
     let conditions = [&runs[0].0, &runs[1].0].map(Experiment::conditions);
-    Shown {
+    MeasuredEffect {
         places,
         conditions,
         peaks,
@@ -173,7 +173,7 @@ fn title(group: Group) -> &'static str {
     }
 }
 
-fn section(out: &mut String, sheet: &Sheet, shown: &Shown) {
+fn section(out: &mut String, sheet: &Sheet, shown: &MeasuredEffect) {
     let named = match sheet.place {
         PlaceKind::Linkage | PlaceKind::Supply => sheet.place.names().join(", "),
         _ => shown.places.join(", "),

@@ -1,6 +1,6 @@
 //! The numbers of a group of rigs as a structure of arrays: a column for each number, a place in it for each rig.
 
-use crate::integrator::{Held, Integrator, Lanes};
+use crate::integrator::{HeldInputs, Integrator, Lanes};
 use crate::lanes::{Axes, Form, Pair, Plain};
 
 /// Rigs that go together: as many as a register of 512 bits holds; narrower ones take them in two or four parts.
@@ -15,10 +15,10 @@ const PAIRS: usize = 7;
 /// One number of each rig of a group.
 type Column = [f64; WIDTH];
 
-/// What does not change in a period.
+/// Constants and inputs, which do not change in a period.
 #[derive(Debug, Clone)]
 #[repr(align(64))] // a column is a line of the cache
-pub(super) struct Fixed {
+pub(super) struct HeldColumns {
     constants: [Column; CONSTANTS],
     command: [Column; 2],
     hand: [Column; 2],
@@ -27,21 +27,21 @@ pub(super) struct Fixed {
     linked: Column,
 }
 
-/// What a substep moves.
+/// States, which a substep changes.
 #[derive(Debug, Clone)]
 #[repr(align(64))]
-pub(super) struct Moving {
+pub(super) struct StateColumns {
     pairs: [[Column; 2]; PAIRS],
     supply_pa: Column,
     /// Not 0 where the substep that led here may have a corner in it, and then it counts for nothing.
     corner: [u64; WIDTH],
 }
 
-impl Fixed {
+impl HeldColumns {
     pub(super) fn new() -> Box<Self> {
         let none = [0.0; WIDTH];
         let (command, hand) = ([none; 2], [none; 2]);
-        Box::new(Fixed { constants: [none; CONSTANTS], command, hand, stopped: none, linked: none })
+        Box::new(HeldColumns { constants: [none; CONSTANTS], command, hand, stopped: none, linked: none })
     }
 
     /// Takes over the laws of a rig.
@@ -51,7 +51,7 @@ impl Fixed {
         debug_assert_eq!(writing.next, CONSTANTS);
     }
 
-    pub(super) fn hold(&mut self, lane: usize, held: &Held) {
+    pub(super) fn set_held(&mut self, lane: usize, held: &HeldInputs) {
         for axis in 0..2 {
             self.command[axis][lane] = held.command.to_array()[axis];
             self.hand[axis][lane] = held.hand.to_array()[axis];
@@ -62,7 +62,7 @@ impl Fixed {
 
     /// A lane without a rig does what another does.
     pub(super) fn shadow(&mut self, of: usize, lane: usize) {
-        self.hold(lane, &self.held(of));
+        self.set_held(lane, &self.held(of));
     }
 
     /// The laws of one lane. `like` is any integrator: it tells which number follows which.
@@ -72,8 +72,8 @@ impl Fixed {
     }
 
     #[inline(always)]
-    pub(super) fn held<P: Axes>(&self, lane: usize) -> Held<P> {
-        Held {
+    pub(super) fn held<P: Axes>(&self, lane: usize) -> HeldInputs<P> {
+        HeldInputs {
             command: P::new(self.command[0][lane], self.command[1][lane]),
             hand: P::new(self.hand[0][lane], self.hand[1][lane]),
             stopped: self.stopped[lane] != 0.0,
@@ -83,10 +83,10 @@ impl Fixed {
     }
 }
 
-impl Moving {
+impl StateColumns {
     pub(super) fn new() -> Box<Self> {
         let none = [0.0; WIDTH];
-        Box::new(Moving { pairs: [[none; 2]; PAIRS], supply_pa: none, corner: [0; WIDTH] })
+        Box::new(StateColumns { pairs: [[none; 2]; PAIRS], supply_pa: none, corner: [0; WIDTH] })
     }
 
     #[inline(always)]

@@ -5,7 +5,7 @@
 //! compiled for wider registers too, and which of them is taken is found out when the program runs: none of them fuses or
 //! reorders anything, so all give the same bits.
 
-use super::columns::{Fixed, Moving, WIDTH};
+use super::columns::{HeldColumns, StateColumns, WIDTH};
 use crate::integrator::Integrator;
 use crate::integrator::laws::Baseline;
 
@@ -68,9 +68,9 @@ impl Registers {
 pub(super) fn substep(
     registers: Registers,
     like: &Integrator,
-    fixed: &Fixed,
-    from: &Moving,
-    to: &mut Moving,
+    fixed: &HeldColumns,
+    from: &StateColumns,
+    to: &mut StateColumns,
 ) {
     match registers {
         Registers::Plain => all_lanes(like, fixed, from, to),
@@ -87,18 +87,18 @@ pub(super) fn substep(
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2")]
-fn in_avx2(like: &Integrator, fixed: &Fixed, from: &Moving, to: &mut Moving) {
+fn in_avx2(like: &Integrator, fixed: &HeldColumns, from: &StateColumns, to: &mut StateColumns) {
     all_lanes(like, fixed, from, to);
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512bw,avx512dq,avx512vl")]
-fn in_avx512(like: &Integrator, fixed: &Fixed, from: &Moving, to: &mut Moving) {
+fn in_avx512(like: &Integrator, fixed: &HeldColumns, from: &StateColumns, to: &mut StateColumns) {
     all_lanes(like, fixed, from, to);
 }
 
 #[inline(always)]
-fn all_lanes(like: &Integrator, fixed: &Fixed, from: &Moving, to: &mut Moving) {
+fn all_lanes(like: &Integrator, fixed: &HeldColumns, from: &StateColumns, to: &mut StateColumns) {
     for lane in 0..WIDTH {
         let of = fixed.laws(lane, like);
         let (lanes, supply_pa) = from.get(lane);

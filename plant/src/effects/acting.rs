@@ -9,14 +9,14 @@
 use super::air::HeatAt;
 use super::flows::PortsAt;
 use super::friction::direction_of;
-use super::memory::{Memory, Moving, seen_at};
+use super::memory::{EffectStates, Memory, axis_conditions_at};
 use super::presliding::Bristle;
 use super::sums::{ExhaustSide, Force, SupplySide};
-use super::tabulated::Seen;
+use super::tabulated::AxisConditions;
 use super::{AxisEffects, ChangedLaws, OpenBalance, act_in_no_step};
 use crate::faults::{Faults, Outlet};
-use crate::integrator::laws::{At, Baseline, Laws};
-use crate::integrator::{Held, Integrator, Lanes, Middle};
+use crate::integrator::laws::{Baseline, Laws, StepContext};
+use crate::integrator::{HeldInputs, Integrator, Lanes, Middle};
 use crate::lanes::{Axes, Choice, Mask, Pair};
 use crate::motion::{MotionSpan, Place, side};
 use crate::parameters::{LinkageParameters, RigParameters};
@@ -101,7 +101,7 @@ impl Effects {
             self.changed_laws[axis].air |= leaks;
             self.changed_laws[axis].stored_air |= leaks;
             if !self.changed_laws[axis].stored_air {
-                self.memory.moving.axes[axis].air_rate_w = [0.0; 2];
+                self.memory.states.axes[axis].air_rate_w = [0.0; 2];
             }
         }
         self.baseline_friction = self.has_baseline_friction();
@@ -145,9 +145,9 @@ impl Effects {
     }
 
     /// Forces on one piston beside air, hand, contact and friction.
-    pub(crate) fn force(&self, axis: usize, seen: &Seen) -> Force {
+    pub(crate) fn force(&self, axis: usize, conditions: &AxisConditions) -> Force {
         let on = &self.on[axis];
-        let extension_m = seen.extension_m;
+        let extension_m = conditions.extension_m;
         let position_m = if axis == 0 { extension_m } else { self.stroke_m - extension_m };
         Force {
             inclination: on.inclination.map_or(0.0, |effect| ALONG_X[axis] * effect.force_n),
@@ -155,47 +155,54 @@ impl Effects {
                 .position_dependent_force
                 .map_or(0.0, |effect| ALONG_X[axis] * effect.term(position_m)),
             end_cushion: on.end_cushion.map_or(0.0, |effect| effect.stop_force(extension_m, self.stroke_m)),
-            tabulated: on.tabulated.force(seen),
-            declared: on.declared.force(&self.declared_in_step(axis, seen)),
-            added: on.added(OpenBalance::Force(seen)),
+            tabulated: on.tabulated.force(conditions),
+            declared: on.declared.force(&self.declared_in_step(axis, conditions)),
+            added: on.added(OpenBalance::Force(conditions)),
         }
     }
 }
 
 impl Effects {
     /// The spools at the midpoint; those at the end are kept where effects move them.
-    fn spool_to_middle(&self, at: At<'_>, carried: &mut Moving) -> Pair {
-        let mut spools = at.spool_after(at.span.spool_to_middle).to_array();
-        let (since_period_s, half_s) = (at.since_period_s(), at.span.span_s / 2.0);
+    fn spool_to_middle(&self, step: StepContext<'_>, extra_state: &mut EffectStates) -> Pair {
+        let mut spools = step.spool_after(step.span.spool_to_middle).to_array();
+        let (since_period_s, half_s) = (step.since_period_s(), step.span.span_s / 2.0);
         for (axis, spool) in spools.iter_mut().enumerate().filter(|(axis, _)| self.changed_laws[*axis].spool)
         {
-            let axis_states = &mut carried.axes[axis];
-            if at.held.stuck[axis] {
-                (*spool, axis_states.spool_rate_per_s) = (at.from.spool.to_array()[axis], 0.0);
+            let axis_states = &mut extra_state.axes[axis];
+            if step.held.stuck[axis] {
+                (*spool, axis_states.spool_rate_per_s) = (step.from.spool.to_array()[axis], 0.0);
                 axis_states.spool = *spool;
                 continue;
             }
-            *spool = self.spool_over(axis, axis_states, at, at.from.spool.to_array()[axis], since_period_s);
-            axis_states.spool = self.spool_over(axis, axis_states, at, *spool, since_period_s + half_s);
+            *spool =
+                self.spool_over(axis, axis_states, step, step.from.spool.to_array()[axis], since_period_s);
+            axis_states.spool = self.spool_over(axis, axis_states, step, *spool, since_period_s + half_s);
         }
         Pair::new(spools[0], spools[1])
     }
 
     /// Pressures and flows at the midpoint of the axes that have effects in them.
-    fn pass_air(&self, at: At<'_>, spool: Pair, carried: &mut Moving, middle: &mut Middle) {
-        let At { of, span, from, node, .. } = at;
+    fn pass_air(
+        &self,
+        step: StepContext<'_>,
+        spool: Pair,
+        extra_state: &mut EffectStates,
+        middle: &mut Middle,
+    ) {
+        let StepContext { of, span, from, node, .. } = step;
         let half_s = span.span_s / 2.0;
-        let ahead_s = at.since_substep_s() + half_s;
+        let ahead_s = step.since_substep_s() + half_s;
         let extension = middle.extension;
         let volume = [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let volume_from = [of.chambers.volume_a(from.extension), of.chambers.volume_b(from.extension)];
-        let supply = SupplySide { supply_droop: carried.droop_pa + carried.droop_pa_per_s * half_s };
+        let supply = SupplySide { supply_droop: extra_state.droop_pa + extra_state.droop_pa_per_s * half_s };
         let mut pressure_pa = middle.pressure.map(Pair::to_array);
         let mut flow = middle.edge_flow.map(Pair::to_array);
         let mut drawn = 0.0;
         for axis in (0..2).filter(|axis| self.changed_laws[*axis].air) {
             let lane = |pair: Pair| pair.to_array()[axis];
-            let axis_states = &mut carried.axes[axis];
+            let axis_states = &mut extra_state.axes[axis];
             let exhaust = ExhaustSide {
                 silencer_back_pressure: axis_states.silencer_pa + axis_states.silencer_pa_per_s * half_s,
             };
@@ -234,10 +241,10 @@ impl Effects {
             }
         }
         if let Some(effect) = self.on[0].supply_droop {
-            let before_pa = carried.droop_pa;
+            let before_pa = extra_state.droop_pa;
             let after_pa = effect.advance(node.middle_pa + before_pa, node.middle_pa, drawn, span.span_s);
-            carried.droop_pa = after_pa - node.middle_pa;
-            carried.droop_pa_per_s = (carried.droop_pa - before_pa) / span.span_s;
+            extra_state.droop_pa = after_pa - node.middle_pa;
+            extra_state.droop_pa_per_s = (extra_state.droop_pa - before_pa) / span.span_s;
         }
         middle.pressure = pressure_pa.map(|lanes| Pair::new(lanes[0], lanes[1]));
         middle.pneumatic = of.chambers.pneumatic_force(middle.pressure[0], middle.pressure[1]);
@@ -245,82 +252,89 @@ impl Effects {
     }
 }
 
-/// What tables are over in a step; speed and spool are those at its beginning.
-fn seen(at: At<'_>, middle: &Middle, axis: usize) -> Seen {
+/// Conditions of an axis in a step; speed and spool are those at its beginning.
+fn axis_conditions(step: StepContext<'_>, middle: &Middle, axis: usize) -> AxisConditions {
     let lane = |pair: Pair| pair.to_array()[axis];
-    Seen {
+    AxisConditions {
         extension_m: lane(middle.extension),
-        velocity_m_per_s: lane(at.from.velocity),
-        spool: lane(at.from.spool),
+        velocity_m_per_s: lane(step.from.velocity),
+        spool: lane(step.from.spool),
         pressure_pa: middle.pressure.map(lane),
     }
 }
 
 impl Laws for Effects {
-    type Carried = Moving;
+    type ExtraState = EffectStates;
 
-    fn carried(&self) -> Moving {
-        self.memory.moving
+    fn extra_state(&self) -> EffectStates {
+        self.memory.states
     }
 
-    fn middle(&self, at: At<'_>, carried: &mut Moving) -> Middle {
-        let spool = self.spool_to_middle(at, carried);
-        let mut middle = at.middle(spool);
+    fn middle(&self, step: StepContext<'_>, extra_state: &mut EffectStates) -> Middle {
+        let spool = self.spool_to_middle(step, extra_state);
+        let mut middle = step.middle(spool);
         if self.changed_laws.iter().any(|laws| laws.air) {
-            self.pass_air(at, spool, carried, &mut middle);
+            self.pass_air(step, spool, extra_state, &mut middle);
         }
         middle
     }
 
-    fn outside(&self, at: At<'_>, middle: &Middle) -> Pair {
+    fn outside(&self, step: StepContext<'_>, middle: &Middle) -> Pair {
         let force = |axis: usize| {
             if self.changed_laws[axis].force {
-                self.force(axis, &seen(at, middle, axis)).sum(0.0)
+                self.force(axis, &axis_conditions(step, middle, axis)).sum(0.0)
             } else {
                 0.0
             }
         };
-        at.held.hand + Pair::new(force(0), force(1))
+        step.held.hand + Pair::new(force(0), force(1))
     }
 
-    fn moving(&self, at: At<'_>) -> Mask {
-        at.from.velocity.differs(Pair::both(0.0)) | Mask::new(self.on_bristles())
+    fn moving(&self, step: StepContext<'_>) -> Mask {
+        step.from.velocity.differs(Pair::both(0.0)) | Mask::new(self.on_bristles())
     }
 
     fn on_bristles(&self) -> [bool; 2] {
         [self.on[0].presliding.is_some(), self.on[1].presliding.is_some()]
     }
 
-    fn sliding(&self, at: At<'_>, middle: &Middle, carried: &Moving, push: Pair, moving: Mask) -> Pair {
+    fn sliding(
+        &self,
+        step: StepContext<'_>,
+        middle: &Middle,
+        extra_state: &EffectStates,
+        push: Pair,
+        moving: Mask,
+    ) -> Pair {
         if self.baseline_friction {
-            return Baseline.sliding(at, middle, &(), push, moving);
+            return Baseline.sliding(step, middle, &(), push, moving);
         }
-        let of = at.of;
+        let of = step.of;
         let [drive, load] = [0, 1].map(|axis| {
-            let axis_states = &carried.axes[axis];
-            let velocity = at.from.velocity.to_array()[axis];
+            let axis_states = &extra_state.axes[axis];
+            let velocity = step.from.velocity.to_array()[axis];
             let push = push.to_array()[axis];
             let friction = self.friction(of, axis, middle, axis_states);
             if let Some(effect) = self.on[axis].presliding {
                 let bristle = Bristle { velocity_m_per_s: velocity, deflection_m: axis_states.deflection_m };
-                return effect.force(bristle, friction.under(velocity, velocity.abs(), push));
+                return effect.force(bristle, friction.bristle_load(velocity, velocity.abs(), push));
             }
             if velocity == 0.0 {
                 return 0.0;
             }
-            let speed = friction.middle_speed(velocity, push, at.span.span_s);
+            let speed = friction.middle_speed(velocity, push, step.span.span_s);
             -velocity.signum() * friction.sliding_n(speed, direction_of(velocity))
         });
         Pair::new(drive, load).where_true(moving)
     }
 
-    fn starting(&self, at: At<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair {
+    fn starting(&self, step: StepContext<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair {
         if self.baseline_friction {
-            return Baseline.starting(at, middle, force, starts);
+            return Baseline.starting(step, middle, force, starts);
         }
-        let of = at.of;
+        let of = step.of;
         let [drive, load] = [0, 1].map(|axis| {
-            let axis_states = &self.memory.moving.axes[axis];
+            let axis_states = &self.memory.states.axes[axis];
             let force = force.to_array()[axis];
             let friction = self.friction(of, axis, middle, axis_states);
             -force.signum() * friction.sliding_n(0.0, direction_of(force))
@@ -328,67 +342,74 @@ impl Laws for Effects {
         Pair::new(drive, load).where_true(starts)
     }
 
-    fn break_away(&self, at: At<'_>, middle: &Middle, force: Pair) -> Pair {
+    fn break_away(&self, step: StepContext<'_>, middle: &Middle, force: Pair) -> Pair {
         if self.baseline_friction {
-            return Baseline.break_away(at, middle, force);
+            return Baseline.break_away(step, middle, force);
         }
-        let of = at.of;
+        let of = step.of;
         let [drive, load] = [0, 1].map(|axis| {
-            if at.from.velocity.to_array()[axis] != 0.0 {
+            if step.from.velocity.to_array()[axis] != 0.0 {
                 return f64::INFINITY; // it moves
             }
-            let axis_states = &self.memory.moving.axes[axis];
+            let axis_states = &self.memory.states.axes[axis];
             let friction = self.friction(of, axis, middle, axis_states);
             friction.break_away_n(direction_of(force.to_array()[axis]))
         });
         Pair::new(drive, load)
     }
 
-    fn ways<'s>(&'s self, at: At<'s>) -> [&'s MotionSpan; 2] {
+    fn ways<'s>(&'s self, step: StepContext<'s>) -> [&'s MotionSpan; 2] {
         if self.baseline_friction {
-            return Baseline.ways(at);
+            return Baseline.ways(step);
         }
-        let [drive, load] = at.from.velocity.to_array().map(side);
-        let [to_middle, to_end] = &self.ways[usize::from(at.span.span_s < self.substep_s)][drive][load];
+        let [drive, load] = step.from.velocity.to_array().map(side);
+        let [to_middle, to_end] = &self.ways[usize::from(step.span.span_s < self.substep_s)][drive][load];
         [to_middle, to_end]
     }
 
-    fn holds(&self, at: At<'_>, middle: &Middle, axis: usize, force: f64) -> bool {
+    fn holds(&self, step: StepContext<'_>, middle: &Middle, axis: usize, force: f64) -> bool {
         if self.baseline_friction {
-            return Baseline.holds(at, middle, axis, force);
+            return Baseline.holds(step, middle, axis, force);
         }
-        let friction = self.friction(at.of, axis, middle, &self.memory.moving.axes[axis]);
+        let friction = self.friction(step.of, axis, middle, &self.memory.states.axes[axis]);
         let break_away_n = friction.break_away_n(direction_of(force));
-        at.of.motion.holds(at.from.place(axis).extension, force, break_away_n)
+        step.of.motion.holds(step.from.place(axis).extension, force, break_away_n)
     }
 
-    fn advance(&self, at: At<'_>, middle: &Middle, carried: &mut Moving, axis: usize, force: f64) -> Place {
+    fn advance(
+        &self,
+        step: StepContext<'_>,
+        middle: &Middle,
+        extra_state: &mut EffectStates,
+        axis: usize,
+        force: f64,
+    ) -> Place {
         if self.baseline_friction {
-            return Baseline.advance(at, middle, &mut (), axis, force);
+            return Baseline.advance(step, middle, &mut (), axis, force);
         }
-        let (of, start) = (at.of, at.from.place(axis));
-        let axis_states = &mut carried.axes[axis];
+        let (of, start) = (step.of, step.from.place(axis));
+        let axis_states = &mut extra_state.axes[axis];
         let friction = self.friction(of, axis, middle, axis_states);
-        let span_s = at.span.span_s;
+        let span_s = step.span.span_s;
         let Some(effect) = self.on[axis].presliding else {
             let speed = friction.middle_speed(start.velocity, force, span_s);
             return of.motion.advance(axis, start, force, &friction.levels(speed), span_s);
         };
         let bristle = Bristle { velocity_m_per_s: start.velocity, deflection_m: axis_states.deflection_m };
         let speed = friction.middle_speed(start.velocity, force, span_s);
-        let under = friction.under(start.velocity, speed, force);
-        let (way_m, bristle) = effect.advance(bristle, under, span_s);
+        let bristle_load = friction.bristle_load(start.velocity, speed, force);
+        let (way_m, bristle) = effect.advance(bristle, bristle_load, span_s);
         axis_states.deflection_m = bristle.deflection_m;
         of.motion
             .stop_at_ends(Place { extension: start.extension + way_m, velocity: bristle.velocity_m_per_s })
     }
 
-    fn air(&self, at: At<'_>, to: &mut Lanes, middle: &Middle, carried: &mut Moving) {
+    fn air(&self, step: StepContext<'_>, to: &mut Lanes, middle: &Middle, extra_state: &mut EffectStates) {
         if !self.changed_laws.iter().any(|laws| laws.stored_air) {
             return;
         }
-        let (of, from) = (at.of, at.from);
-        let span_s = at.span.span_s;
+        let (of, from) = (step.of, step.from);
+        let span_s = step.span.span_s;
         let normal_pa = of.chambers.normal_pa;
         let volumes = |extension| [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let (volume_from, volume_to) = (volumes(from.extension), volumes(to.extension));
@@ -399,14 +420,15 @@ impl Laws for Effects {
             }
             let lane = |pair: Pair| pair.to_array()[axis];
             let pressure_pa = middle.pressure.map(lane);
-            let mut leakage = self.leakage(of, axis, &seen(at, middle, axis)).map(|terms| terms.sum(0.0));
+            let mut leakage =
+                self.leakage(of, axis, &axis_conditions(step, middle, axis)).map(|terms| terms.sum(0.0));
             for (chamber, leakage) in leakage.iter_mut().enumerate().filter(|_| self.leaks(axis)) {
                 let lacks_pa = (of.atmospheric_pa - pressure_pa[chamber]).abs();
                 let most = lacks_pa / lane(middle.per_volume[chamber]) / (normal_pa * span_s);
                 let outlet = &self.outlets[axis][chamber];
                 *leakage += outlet.inflow(pressure_pa[chamber], of.atmospheric_pa, most);
             }
-            let axis_states = &mut carried.axes[axis];
+            let axis_states = &mut extra_state.axes[axis];
             for chamber in 0..2 {
                 // What lag and bounds have let in, as a mean flow over the step.
                 let valve = (stored[chamber][axis] - lane(from.air()[chamber].stored)) / (normal_pa * span_s);
@@ -436,24 +458,24 @@ impl Laws for Effects {
         (to.air_a.stored, to.air_b.stored) = (a, b);
     }
 
-    fn spool(&self, at: At<'_>, carried: &Moving) -> Pair {
-        let baseline = at.spool_after(at.span.spool_to_end).to_array();
+    fn spool(&self, step: StepContext<'_>, extra_state: &EffectStates) -> Pair {
+        let baseline = step.spool_after(step.span.spool_to_end).to_array();
         let spool = |axis: usize| {
-            if self.changed_laws[axis].spool { carried.axes[axis].spool } else { baseline[axis] }
+            if self.changed_laws[axis].spool { extra_state.axes[axis].spool } else { baseline[axis] }
         };
         Pair::new(spool(0), spool(1))
     }
 
-    fn keep(&mut self, of: &Integrator, held: Held, lanes: &Lanes, carried: &Moving) {
+    fn keep(&mut self, of: &Integrator, held: HeldInputs, lanes: &Lanes, extra_state: &EffectStates) {
         let span_s = self.substep_s;
-        self.memory.moving = *carried;
+        self.memory.states = *extra_state;
         self.memory.substeps += 1;
         self.see_forces(of, lanes, held.hand, held.linked);
         for axis in 0..2 {
             let lane = |pair: Pair| pair.to_array()[axis];
             // Bristles never come to rest to the bit.
             let creep = if self.on_bristles()[axis] { CREEP_M_PER_S } else { 0.0 };
-            let axis_states = &mut self.memory.moving.axes[axis];
+            let axis_states = &mut self.memory.states.axes[axis];
             axis_states.rest_s =
                 if lane(lanes.velocity).abs() <= creep { axis_states.rest_s + span_s } else { 0.0 };
             for (line, flow) in self.memory.lines[axis].iter_mut().zip(axis_states.port_flow_m3_per_s) {
@@ -463,7 +485,7 @@ impl Laws for Effects {
                 self.keep_readings(of, axis, lanes);
             }
             if self.on[axis].declared.remembers() {
-                let values = self.declared_in_step(axis, &seen_at(of, lanes, axis)).values();
+                let values = self.declared_in_step(axis, &axis_conditions_at(of, lanes, axis)).values();
                 self.on[axis].declared.renew(&values, span_s, &mut self.memory.declared[axis]);
             }
         }

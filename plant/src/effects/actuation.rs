@@ -1,10 +1,10 @@
 //! From a command to a spool with effects: dead time, offset, play, and how the spool moves.
 
 use super::acting::Effects;
-use super::memory::AxisMoving;
+use super::memory::AxisEffectStates;
 use super::sums::{Arriving, LimitedRate, SpoolRate, Target};
 use crate::integrator::PERIOD_S;
-use crate::integrator::laws::At;
+use crate::integrator::laws::StepContext;
 use crate::lanes::Axes;
 
 impl Effects {
@@ -20,7 +20,7 @@ impl Effects {
     }
 
     /// Terms of the spool's target, given what arrives.
-    pub(crate) fn target(&self, axis: usize, axis_states: &AxisMoving, arriving: f64) -> Target {
+    pub(crate) fn target(&self, axis: usize, axis_states: &AxisEffectStates, arriving: f64) -> Target {
         let hysteresis = self.on[axis].valve_hysteresis;
         Target { valve_hysteresis: hysteresis.map_or(0.0, |effect| effect.term(axis_states.play, arriving)) }
     }
@@ -29,7 +29,7 @@ impl Effects {
     pub(crate) fn spool_rate(
         &self,
         axis: usize,
-        axis_states: &AxisMoving,
+        axis_states: &AxisEffectStates,
         spool: f64,
         target: f64,
     ) -> (SpoolRate, LimitedRate) {
@@ -47,32 +47,32 @@ impl Effects {
     pub(super) fn spool_over(
         &self,
         axis: usize,
-        axis_states: &mut AxisMoving,
-        at: At<'_>,
+        axis_states: &mut AxisEffectStates,
+        step: StepContext<'_>,
         spool: f64,
         local_s: f64,
     ) -> f64 {
-        let span_s = at.span.span_s / 2.0;
+        let span_s = step.span.span_s / 2.0;
         let edge_s = self.on[axis].command_dead_time.map_or(0.0, |effect| effect.delay_s % PERIOD_S);
         if local_s < edge_s && edge_s < local_s + span_s {
-            let at_edge = self.spool_leg(axis, axis_states, at, spool, [local_s, edge_s]);
-            return self.spool_leg(axis, axis_states, at, at_edge, [edge_s, local_s + span_s]);
+            let at_edge = self.spool_leg(axis, axis_states, step, spool, [local_s, edge_s]);
+            return self.spool_leg(axis, axis_states, step, at_edge, [edge_s, local_s + span_s]);
         }
-        self.spool_leg(axis, axis_states, at, spool, [local_s, local_s + span_s])
+        self.spool_leg(axis, axis_states, step, spool, [local_s, local_s + span_s])
     }
 
     /// The spool after a leg of time over which its target is held.
     fn spool_leg(
         &self,
         axis: usize,
-        axis_states: &mut AxisMoving,
-        at: At<'_>,
+        axis_states: &mut AxisEffectStates,
+        step: StepContext<'_>,
         from: f64,
         leg_s: [f64; 2],
     ) -> f64 {
         let on = &self.on[axis];
         let span_s = leg_s[1] - leg_s[0];
-        let command = at.held.command.to_array()[axis];
+        let command = step.held.command.to_array()[axis];
         let arriving = self.arriving(axis, command, (leg_s[0] + leg_s[1]) / 2.0).sum(command);
         let sent = self.target(axis, axis_states, arriving).sum(arriving);
         axis_states.play = sent;
@@ -82,9 +82,9 @@ impl Effects {
             axis_states.spool_rate_per_s = rate;
             spool
         } else {
-            let half_step = at.span.span_s / 2.0;
+            let half_step = step.span.span_s / 2.0;
             let keep = if on.command_dead_time.is_none() && span_s <= half_step {
-                at.span.spool_to_middle.drive()
+                step.span.spool_to_middle.drive()
             } else {
                 libm::exp(-span_s / self.spool_time_constant_s)
             };

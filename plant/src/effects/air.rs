@@ -4,9 +4,9 @@ use super::OpenBalance;
 use super::acting::Effects;
 use super::flows::{Ports, PortsAt};
 use super::heat_exchange::{ChamberHeat, wetted_m2};
-use super::memory::Moving;
+use super::memory::EffectStates;
 use super::sums::{AirRate, ExhaustSide, Leakage, LineFlow, SupplySide};
-use super::tabulated::Seen;
+use super::tabulated::AxisConditions;
 use crate::integrator::Integrator;
 use crate::state::State;
 use crate::truth::AirAt;
@@ -20,19 +20,19 @@ pub(crate) struct HeatAt {
 
 impl Effects {
     /// Pressure that effects add behind the supply edges.
-    pub(crate) fn supply_side(&self, moving: &Moving) -> SupplySide {
-        SupplySide { supply_droop: moving.droop_pa }
+    pub(crate) fn supply_side(&self, states: &EffectStates) -> SupplySide {
+        SupplySide { supply_droop: states.droop_pa }
     }
 
     pub(crate) fn ports_at(&self, of: &Integrator, axis: usize, state: &State, air: &AirAt) -> Ports {
-        let moving = &self.memory.moving;
-        let exhaust = ExhaustSide { silencer_back_pressure: moving.axes[axis].silencer_pa };
+        let states = &self.memory.states;
+        let exhaust = ExhaustSide { silencer_back_pressure: states.axes[axis].silencer_pa };
         self.ports(
             of,
             axis,
             &PortsAt {
                 spool: state.axes[axis].spool,
-                supply_pa: self.supply_side(moving).sum(state.supply_pressure_pa),
+                supply_pa: self.supply_side(states).sum(state.supply_pressure_pa),
                 exhaust_pa: exhaust.sum(of.chambers.exhaust_pa()),
                 pressure_pa: air.of_axis_pa(axis),
                 extension_m: state.axes[axis].extension_m,
@@ -42,9 +42,9 @@ impl Effects {
     }
 
     /// Flows into the chambers of an axis beside the valve's, by their pressures and what tables are over.
-    pub(crate) fn leakage(&self, of: &Integrator, axis: usize, seen: &Seen) -> [Leakage; 2] {
+    pub(crate) fn leakage(&self, of: &Integrator, axis: usize, conditions: &AxisConditions) -> [Leakage; 2] {
         let on = &self.on[axis];
-        let pressure_pa = seen.pressure_pa;
+        let pressure_pa = conditions.pressure_pa;
         let across = on.piston_leakage.map_or(0.0, |effect| effect.flow(pressure_pa[0], pressure_pa[1]));
         let out = |chamber: usize| {
             on.rod_leakage[chamber]
@@ -53,9 +53,9 @@ impl Effects {
         [0, 1].map(|chamber| Leakage {
             piston_leakage: if chamber == 0 { -across } else { across },
             rod_leakage: out(chamber),
-            tabulated: on.tabulated.flow(chamber, seen),
-            declared: on.declared.flow(chamber, &self.declared_in_step(axis, seen)),
-            added: on.added(OpenBalance::Leakage { chamber, seen }),
+            tabulated: on.tabulated.flow(chamber, conditions),
+            declared: on.declared.flow(chamber, &self.declared_in_step(axis, conditions)),
+            added: on.added(OpenBalance::Leakage { chamber, conditions }),
         })
     }
 

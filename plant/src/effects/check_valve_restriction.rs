@@ -25,7 +25,7 @@
 //! Source: two resistances in series, ISO 6358-3:2014; spring of the non-return valve, Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -47,7 +47,7 @@ impl Effect for CheckValveRestriction {
         source: "ISO 6358-3:2014, Beater 2007; range: textbook prior",
         // Without cracking pressure it is a line resistance.
         defined_by_first: true,
-        told_apart_by: &[ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::ConstantVolume],
         keys: &[
             EffectKey {
                 name: "cracking_pressure_bar",

@@ -12,7 +12,7 @@
 //!
 //! Source: dead time of sampled loops, Astrom and Wittenmark, Computer-Controlled Systems, 1997; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -30,7 +30,7 @@ impl Effect for CommandDeadTime {
         law: "the command acts a fixed time late",
         source: "dead time of sampled loops, Astrom and Wittenmark 1997; range: textbook prior",
         has_memory: true,
-        told_apart_by: &[ByHand::SpoolSignal],
+        distinguished_by: &[ManualMeasurement::SpoolSignal],
         keys: &[EffectKey {
             name: "delay_ms",
             unit: Unit::Millisecond,

@@ -14,7 +14,7 @@
 //!
 //! Source: rig-model.md, Masses and linkage, for the contact; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, ManualMeasurement, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -32,7 +32,7 @@ impl Effect for CouplingBacklash {
         source: "rig-model.md, Masses and linkage; range: effects.md, textbook prior",
         moves_start_states: true,
         excited_by: Excitation::LinkedRods,
-        told_apart_by: &[ByHand::Uncoupling],
+        distinguished_by: &[ManualMeasurement::Uncoupling],
         keys: &[EffectKey {
             name: "gap_mm",
             unit: Unit::Millimetre,

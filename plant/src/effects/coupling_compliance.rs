@@ -15,7 +15,7 @@
 //!
 //! Source: Kelvin-Voigt contact of rig-model.md, Masses and linkage; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, ManualMeasurement, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -35,7 +35,7 @@ impl Effect for CouplingCompliance {
         // Damping alone absorbs the errors of the start states.
         defined_by_first: true,
         excited_by: Excitation::LinkedRods,
-        told_apart_by: &[ByHand::Uncoupling],
+        distinguished_by: &[ManualMeasurement::Uncoupling],
         keys: &[
             EffectKey {
                 name: "stiffness_n_per_m",

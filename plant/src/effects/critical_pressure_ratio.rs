@@ -20,7 +20,7 @@
 //! Source: ISO 6358-1:2013, flow-rate characteristics of components, with subsonic index m = 0.5; range: textbook prior for
 //! valves of this size (Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7).
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::single_edge_flow;
@@ -37,7 +37,7 @@ impl Effect for CriticalPressureRatio {
         laws: &[Law::Air],
         law: "an edge's flow is the ellipse of ISO 6358 with its own critical pressure ratio b instead of 0.5",
         source: "ISO 6358-1:2013; range: textbook prior (Beater 2007)",
-        told_apart_by: &[ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::ConstantVolume],
         keys: &[EffectKey {
             name: "critical_ratio",
             unit: Unit::One,

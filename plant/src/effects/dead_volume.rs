@@ -14,7 +14,7 @@
 //! Source: inactive volume at the ends of the stroke, Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336; range:
 //! textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -30,7 +30,7 @@ impl Effect for DeadVolume {
         law: "dead volume and hose of the axis' chambers differ from the file",
         source: "inactive volume, Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
         excited_by: Excitation::NearEnd,
-        told_apart_by: &[ByHand::ConstantVolume, ByHand::PressedEnds],
+        distinguished_by: &[ManualMeasurement::ConstantVolume, ManualMeasurement::PressedEnds],
         keys: &[EffectKey {
             name: "volume_cm3",
             unit: Unit::CubicCentimetre,

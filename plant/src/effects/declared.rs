@@ -32,9 +32,9 @@
 //!
 //! Source: the file that declares it.
 
-use super::remembered::{Kept, Remembered, renew};
+use super::remembered::{MemoryLaw, MemoryVariable, renew};
 use super::sheet::{Element, Part, Place, PlaceKind};
-use super::tabulated::{MOST_FLOW_NL_PER_MIN, MOST_FORCE_N, Seen, neither_empties_nor_bursts};
+use super::tabulated::{AxisConditions, MOST_FLOW_NL_PER_MIN, MOST_FORCE_N, neither_empties_nor_bursts};
 use crate::parameters::table::Unit;
 use crate::parameters::{ParameterError, RigParameters};
 use crate::state::Axis;
@@ -184,7 +184,7 @@ pub struct Declared {
     pub add: String,
     pub(crate) numbers: Vec<Number>,
     /// What it keeps from step to step, in the order of the file.
-    pub memory: Vec<Remembered>,
+    pub memory: Vec<MemoryVariable>,
     /// Curves that its expressions read.
     pub(crate) tables: Vec<Table>,
     /// Effects or suspects that are known to do the same.
@@ -267,7 +267,7 @@ impl Declared {
 /// What expressions are over, at an instant of an axis.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeclaredAt<'a> {
-    pub(crate) seen: &'a Seen,
+    pub(crate) conditions: &'a AxisConditions,
     pub(crate) command: f64,
     pub(crate) time_s: f64,
     /// What the force sensor should show, N; in a step that of the end of the substep before.
@@ -279,7 +279,7 @@ pub(crate) struct DeclaredAt<'a> {
 impl DeclaredAt<'_> {
     /// In the order of [`VARIABLES`].
     pub(super) fn values(&self) -> [f64; VARIABLES.len()] {
-        let Seen { extension_m, velocity_m_per_s, spool, pressure_pa: [a, b] } = *self.seen;
+        let AxisConditions { extension_m, velocity_m_per_s, spool, pressure_pa: [a, b] } = *self.conditions;
         [extension_m, velocity_m_per_s, a, b, self.command, spool, self.time_s, self.sensor_force_n]
     }
 }
@@ -292,19 +292,19 @@ fn value(formula: &Formula, at: &[f64; VARIABLES.len()], kept: &[f64]) -> f64 {
     formula.value(&all[..VARIABLES.len() + kept.len()])
 }
 
-/// A term at work.
+/// A declared term of an axis.
 #[derive(Debug, Clone)]
-struct Acting {
+struct ActiveTerm {
     target: Target,
     formula: Formula,
-    /// Where what it keeps lies among that of its axis.
+    /// Range of its memory variables among those of its axis.
     kept: Range<usize>,
 }
 
 #[derive(Debug, Clone, Default)]
 pub(crate) struct DeclaredTerms {
-    terms: Vec<Acting>,
-    laws: Vec<Kept>,
+    terms: Vec<ActiveTerm>,
+    laws: Vec<MemoryLaw>,
     /// Whether a force, a flow or what is kept is over the force sensor.
     pub(crate) follows_sensor: bool,
     kg_per_m3: f64,
@@ -318,11 +318,11 @@ impl DeclaredTerms {
         let mut follows_sensor = false;
         for term in rig.terms().iter().filter(|term| term.axis == axis) {
             let first = laws.len();
-            laws.extend(term.memory.iter().map(Remembered::kept));
+            laws.extend(term.memory.iter().map(MemoryVariable::law));
             let (target, formula) = (term.target, term.formula.clone());
             let in_step = target.kind() != PlaceKind::Channel && formula.reads(SENSOR_FORCE);
-            follows_sensor |= in_step || term.memory.iter().any(Remembered::reads_sensor_force);
-            terms.push(Acting { target, formula, kept: first..laws.len() });
+            follows_sensor |= in_step || term.memory.iter().any(MemoryVariable::reads_sensor_force);
+            terms.push(ActiveTerm { target, formula, kept: first..laws.len() });
         }
         DeclaredTerms {
             terms,
@@ -373,7 +373,7 @@ impl DeclaredTerms {
     pub(crate) fn flow(&self, chamber: usize, at: &DeclaredAt<'_>) -> f64 {
         let most = Unit::NormalLitrePerMinute.to_si(MOST_FLOW_NL_PER_MIN);
         let flow = self.sum([Target::FlowA, Target::FlowB][chamber], at) / self.kg_per_m3;
-        let pressure_pa = at.seen.pressure_pa[chamber];
+        let pressure_pa = at.conditions.pressure_pa[chamber];
         neither_empties_nor_bursts(flow.clamp(-most, most), pressure_pa, [self.exhaust_pa, self.supply_pa])
     }
 

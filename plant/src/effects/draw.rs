@@ -19,7 +19,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 
 use super::SHEETS;
-use super::sheet::{EffectKey, Part, Place, Sheet, Switched};
+use super::sheet::{ActiveEffect, EffectKey, Part, Place, Sheet};
 
 /// Turns a seed into another than the sensors' noise has.
 const DOMAIN: u64 = 0x5ea1_ed00_ef7e_c750;
@@ -28,7 +28,7 @@ const HIDES_NOTHING: f64 = 0.2;
 
 /// Axes that effects are drawn for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Among {
+pub enum AxisSelection {
     /// The drive axis, and the supply that feeds it.
     Drive,
     /// The load axis, and the supply that feeds it.
@@ -37,14 +37,14 @@ pub enum Among {
     Both,
 }
 
-impl Among {
+impl AxisSelection {
     /// Whether effects may be drawn at this place.
     #[must_use]
     pub fn allows(self, place: Place) -> bool {
         match place.part {
-            Part::Drive => self != Among::Load,
-            Part::Load => self != Among::Drive,
-            Part::Linkage => self == Among::Both,
+            Part::Drive => self != AxisSelection::Load,
+            Part::Load => self != AxisSelection::Drive,
+            Part::Linkage => self == AxisSelection::Both,
             Part::Supply => true,
         }
     }
@@ -59,7 +59,7 @@ impl Among {
 /// More effects were asked for than there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("{asked} different effects were asked for; allowed are 0 to {most} here")]
-pub struct TooMany {
+pub struct TooManyEffects {
     /// Effects asked for.
     pub asked: usize,
     /// Effects that have a place on the axes asked for.
@@ -69,18 +69,18 @@ pub struct TooMany {
 /// Draws `count` different effects, in the order of the catalogue.
 ///
 /// # Errors
-/// [`TooMany`] if the axes have fewer.
-pub fn draw(seed: u64, count: usize, among: Among) -> Result<Vec<Switched>, TooMany> {
+/// [`TooManyEffects`] if the axes have fewer.
+pub fn draw(seed: u64, count: usize, among: AxisSelection) -> Result<Vec<ActiveEffect>, TooManyEffects> {
     let mut left = among.sheets();
     if count > left.len() {
-        return Err(TooMany { asked: count, most: left.len() });
+        return Err(TooManyEffects { asked: count, most: left.len() });
     }
     let mut sampler = EffectSampler::new(seed);
-    let mut effects: Vec<Switched> = Vec::new();
+    let mut effects: Vec<ActiveEffect> = Vec::new();
     for _ in 0..count {
         let sheet = left.remove(sampler.index(left.len()));
         let place = sampler.place(sheet, among).expect("only sheets with a place here are left");
-        effects.push(Switched { name: sheet.name, place, numbers: sampler.numbers(sheet) });
+        effects.push(ActiveEffect { name: sheet.name, place, numbers: sampler.numbers(sheet) });
     }
     effects.sort_by_key(|effect| SHEETS.iter().position(|sheet| sheet.name == effect.name));
     Ok(effects)
@@ -100,7 +100,7 @@ impl EffectSampler {
     }
 
     /// One of the effect's places here; `None` if it has none.
-    pub fn place(&mut self, sheet: &Sheet, among: Among) -> Option<Place> {
+    pub fn place(&mut self, sheet: &Sheet, among: AxisSelection) -> Option<Place> {
         let places: Vec<Place> =
             sheet.place.places().iter().copied().filter(|place| among.allows(*place)).collect();
         if places.is_empty() { None } else { Some(places[self.index(places.len())]) }
@@ -153,7 +153,7 @@ impl EffectSampler {
 
 /// The tables `[effects.…]` that switch these on: what a rig file or a sealed file holds.
 #[must_use]
-pub fn as_toml(effects: &[Switched]) -> String {
+pub fn as_toml(effects: &[ActiveEffect]) -> String {
     let mut text = String::new();
     for effect in effects {
         // Writing into a text cannot fail.
@@ -174,24 +174,24 @@ mod tests {
     use crate::parameters::RigParameters;
     use std::collections::BTreeSet;
 
-    fn many(count: usize, among: Among) -> Vec<Switched> {
+    fn many(count: usize, among: AxisSelection) -> Vec<ActiveEffect> {
         (0..2000).flat_map(|seed| draw(seed, count, among).expect("there are so many")).collect()
     }
 
     #[test]
     fn a_draw_is_a_function_of_its_seed() {
         for seed in [0, 1, 7, u64::MAX] {
-            assert_eq!(draw(seed, 5, Among::Both), draw(seed, 5, Among::Both));
+            assert_eq!(draw(seed, 5, AxisSelection::Both), draw(seed, 5, AxisSelection::Both));
         }
         let texts: BTreeSet<String> =
-            (0..100).map(|seed| as_toml(&draw(seed, 2, Among::Both).unwrap())).collect();
+            (0..100).map(|seed| as_toml(&draw(seed, 2, AxisSelection::Both).unwrap())).collect();
         assert_eq!(texts.len(), 100);
     }
 
     #[test]
     fn a_draw_of_today_is_that_of_any_day() {
         // Seeds are stored in place of what they draw: a sheet whose range or place in the list changes makes them another study.
-        let text = as_toml(&draw(1, 1, Among::Both).unwrap());
+        let text = as_toml(&draw(1, 1, AxisSelection::Both).unwrap());
         let was = "[effects.stribeck-friction.drive]\nvelocity_mm_per_s = 2.83160585667273\nexponent = 1.9889313915891174\n\n";
         assert_eq!(text, was);
     }
@@ -199,7 +199,7 @@ mod tests {
     #[test]
     fn every_effect_and_every_place_comes_up() {
         let drawn: BTreeSet<_> =
-            many(3, Among::Both).iter().map(|effect| (effect.name, effect.place)).collect();
+            many(3, AxisSelection::Both).iter().map(|effect| (effect.name, effect.place)).collect();
         let all: usize = SHEETS.iter().map(|sheet| sheet.place.places().len()).sum();
         assert_eq!(drawn.len(), all);
     }
@@ -209,17 +209,21 @@ mod tests {
         let of_linkage = SHEETS.iter().filter(|sheet| sheet.place == PlaceKind::Linkage).count();
         let (all, of_one_axis) = (SHEETS.len(), SHEETS.len() - of_linkage);
         assert!(of_one_axis < all);
-        for (among, most) in [(Among::Both, all), (Among::Drive, of_one_axis), (Among::Load, of_one_axis)] {
+        for (among, most) in [
+            (AxisSelection::Both, all),
+            (AxisSelection::Drive, of_one_axis),
+            (AxisSelection::Load, of_one_axis),
+        ] {
             let names: BTreeSet<_> = draw(3, most, among).unwrap().iter().map(|effect| effect.name).collect();
             assert_eq!(names.len(), most);
-            assert_eq!(draw(3, most + 1, among), Err(TooMany { asked: most + 1, most }));
+            assert_eq!(draw(3, most + 1, among), Err(TooManyEffects { asked: most + 1, most }));
             assert_eq!(draw(3, 0, among), Ok(Vec::new()));
         }
     }
 
     #[test]
     fn an_axis_gets_its_own_effects_and_those_of_the_supply() {
-        for (among, part) in [(Among::Drive, Part::Drive), (Among::Load, Part::Load)] {
+        for (among, part) in [(AxisSelection::Drive, Part::Drive), (AxisSelection::Load, Part::Load)] {
             let parts: BTreeSet<Part> = many(2, among).iter().map(|effect| effect.place.part).collect();
             assert_eq!(parts, BTreeSet::from([part, Part::Supply]));
         }
@@ -227,7 +231,7 @@ mod tests {
 
     #[test]
     fn numbers_lie_in_their_drawn_range_with_the_sign_that_they_may_have_and_never_near_the_baselines() {
-        for effect in many(4, Among::Both) {
+        for effect in many(4, AxisSelection::Both) {
             let sheet = super::super::sheet(effect.name).unwrap();
             for (i, (key, number)) in sheet.keys.iter().zip(&effect.numbers).enumerate() {
                 let what = format!("{} {} = {number}", effect.name, key.name);
@@ -261,7 +265,7 @@ mod tests {
     fn the_text_of_a_draw_switches_on_what_was_drawn() {
         let baseline = RigParameters::baseline();
         for seed in 0..200 {
-            let effects = draw(seed, 6, Among::Both).unwrap();
+            let effects = draw(seed, 6, AxisSelection::Both).unwrap();
             let rig = baseline.with_effects_of(&as_toml(&effects), "sealed.toml").unwrap();
             assert_eq!(rig.effects(), effects);
         }

@@ -26,7 +26,7 @@
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; adjusting screw and check valve as makers of cylinders draw
 //! them; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -48,7 +48,7 @@ impl Effect for EndCushion {
         source: "eq. (4) for the orifice; range: effects.md, textbook prior",
         nonlinear_in_amplitude: true,
         excited_by: Excitation::IntoEnd,
-        told_apart_by: &[ByHand::PressedEnds],
+        distinguished_by: &[ManualMeasurement::PressedEnds],
         keys: &[
             EffectKey {
                 name: "cushion_kv_m3_per_h",

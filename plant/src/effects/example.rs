@@ -67,8 +67,8 @@ fn unit(balance: &OpenBalance<'_>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::super::acting::Effects;
-    use super::super::friction::{Friction, Rubbing};
-    use super::super::tabulated::Seen;
+    use super::super::friction::{Friction, FrictionConditions};
+    use super::super::tabulated::AxisConditions;
     use super::*;
     use crate::{Inputs, Plant, Setup};
     use std::path::Path;
@@ -119,14 +119,15 @@ mod tests {
         };
         let ((plant, with), (_, without)) = (of(1.0), of(0.0));
         let integrator = &plant.integrator;
-        let seen = Seen { extension_m: 0.2, velocity_m_per_s: 0.1, spool: 0.3, pressure_pa: [4e5, 3e5] };
-        let rubbing = Rubbing { extension_m: 0.2, gauge_pa: [3e5, 2e5], rest_s: 0.0 };
+        let conditions =
+            AxisConditions { extension_m: 0.2, velocity_m_per_s: 0.1, spool: 0.3, pressure_pa: [4e5, 3e5] };
+        let friction_conditions = FrictionConditions { extension_m: 0.2, gauge_pa: [3e5, 2e5], rest_s: 0.0 };
         let sums = |effects: &Effects| {
-            let at = effects.declared_at(0, &seen, 0.0);
-            let friction = Friction { effects, of: integrator, axis: 0, rubbing };
+            let at = effects.declared_at(0, &conditions, 0.0);
+            let friction = Friction { effects, of: integrator, axis: 0, conditions: friction_conditions };
             [
-                effects.force(0, &seen).sum(0.0),
-                effects.leakage(integrator, 0, &seen)[1].sum(0.0),
+                effects.force(0, &conditions).sum(0.0),
+                effects.leakage(integrator, 0, &conditions)[1].sum(0.0),
                 friction.levels(0.1).sliding_n[0],
                 friction.levels(0.1).break_away_n[1],
                 effects.position_reading(0, 0.0, &at).sum(0.0),

@@ -5,19 +5,19 @@
 //! y' = u_1 - (u_1 - u_0) phi_1 + (y - u_0) e^-z
 //! ```
 //!
-//! y shown, u truth, in the sensor's unit; tau time constant, s, >= 0; h, s, > 0. tau = 0 shows the truth. Both factors lie in
+//! y output, u truth, in the sensor's unit; tau time constant, s, >= 0; h, s, > 0. tau = 0 gives the truth. Both factors lie in
 //! [0, 1], so that no span is too long; cut in parts, a span gives the same.
 //!
 //! Source: variation of constants.
 
-/// What the sensor shows at the end of a span, in the unit of what it shows.
-pub(super) fn advance(time_constant_s: f64, shown: f64, truth_from: f64, truth_to: f64, span_s: f64) -> f64 {
+/// Output of the sensor at the end of a span, in its unit.
+pub(super) fn advance(time_constant_s: f64, output: f64, truth_from: f64, truth_to: f64, span_s: f64) -> f64 {
     if time_constant_s == 0.0 || span_s == 0.0 {
-        return if time_constant_s == 0.0 { truth_to } else { shown };
+        return if time_constant_s == 0.0 { truth_to } else { output };
     }
     let z = span_s / time_constant_s;
     let risen = -libm::expm1(-z);
-    truth_to - (truth_to - truth_from) * (risen / z) + (shown - truth_from) * (1.0 - risen)
+    truth_to - (truth_to - truth_from) * (risen / z) + (output - truth_from) * (1.0 - risen)
 }
 
 #[cfg(test)]
@@ -60,29 +60,29 @@ mod tests {
         #[test]
         fn it_does_not_matter_how_a_span_is_cut(
             tau in 1e-6..0.02_f64,
-            shown in -1.0..1.0_f64,
+            output in -1.0..1.0_f64,
             from in -1.0..1.0_f64,
             to in -1.0..1.0_f64,
             cut in 0.01..0.99_f64,
         ) {
             let span = 1e-3;
             let between = from + (to - from) * cut;
-            let half = advance(tau, shown, from, between, span * cut);
+            let half = advance(tau, output, from, between, span * cut);
             let parts = advance(tau, half, between, to, span - span * cut);
             // Roundings of numbers up to 2.
-            prop_assert!((advance(tau, shown, from, to, span) - parts).abs() < 1e-14);
+            prop_assert!((advance(tau, output, from, to, span) - parts).abs() < 1e-14);
         }
 
         #[test]
         fn it_stays_between_what_it_shows_and_what_is_true(
             tau in 0.0..0.02_f64,
-            shown in -1.0..1.0_f64,
+            output in -1.0..1.0_f64,
             from in -1.0..1.0_f64,
             to in -1.0..1.0_f64,
             span in 1e-6..1e-3_f64,
         ) {
-            let next = advance(tau, shown, from, to, span);
-            let [low, high] = [shown.min(from).min(to), shown.max(from).max(to)];
+            let next = advance(tau, output, from, to, span);
+            let [low, high] = [output.min(from).min(to), output.max(from).max(to)];
             // Roundings of numbers up to 2.
             prop_assert!((low - 1e-15..=high + 1e-15).contains(&next));
         }

@@ -12,7 +12,7 @@
 //!
 //! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Element, Excitation, Group, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Element, Excitation, Group, ManualMeasurement, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,7 +29,7 @@ impl Effect for ForceSensorGain {
         source: "gain error of a transducer; range: effects.md, textbook prior",
         excited_by: Excitation::LinkedRods,
         sensor_error: Some((SensorError::Gain, Some(Element::Force))),
-        told_apart_by: &[ByHand::KnownWeight],
+        distinguished_by: &[ManualMeasurement::KnownWeight],
         keys: &[EffectKey {
             name: "gain_percent",
             unit: Unit::Percent,

@@ -12,7 +12,7 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Element, Group, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,7 +29,7 @@ impl Effect for ForceSensorOffset {
         law: "the force sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Offset, Some(Element::Force))),
-        told_apart_by: &[ByHand::Tilting, ByHand::KnownWeight],
+        distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::KnownWeight],
         keys: &[EffectKey {
             name: "offset_n",
             unit: Unit::Newton,

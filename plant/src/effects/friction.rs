@@ -2,17 +2,17 @@
 
 use super::OpenBalance;
 use super::acting::Effects;
-use super::memory::AxisMoving;
-use super::presliding::{Bristle, Under};
+use super::memory::AxisEffectStates;
+use super::presliding::{Bristle, BristleLoad};
 use super::sums::{BreakAwayLevel, Bristles, SlidingLevel, Viscous};
 use crate::integrator::{Integrator, Middle};
 use crate::lanes::Axes;
 use crate::motion::{Levels, Place, side};
 use crate::truth::AirAt;
 
-/// What the levels depend on beside the speed.
+/// Values that the friction levels depend on, besides the speed.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Rubbing {
+pub(crate) struct FrictionConditions {
     pub(crate) extension_m: f64,
     /// Gauge pressures of chambers a and b, Pa.
     pub(crate) gauge_pa: [f64; 2],
@@ -25,7 +25,7 @@ pub(crate) struct Friction<'a> {
     pub(super) effects: &'a Effects,
     pub(super) of: &'a Integrator,
     pub(super) axis: usize,
-    pub(super) rubbing: Rubbing,
+    pub(super) conditions: FrictionConditions,
 }
 
 /// Place of a direction in [`Levels`] as a sign.
@@ -58,15 +58,15 @@ impl Effects {
         of: &'a Integrator,
         axis: usize,
         middle: &Middle,
-        axis_states: &AxisMoving,
+        axis_states: &AxisEffectStates,
     ) -> Friction<'a> {
         let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
-        let rubbing = Rubbing {
+        let conditions = FrictionConditions {
             extension_m: middle.extension.to_array()[axis],
             gauge_pa: pressure_pa.map(|pa| pa - of.atmospheric_pa),
             rest_s: axis_states.rest_s,
         };
-        Friction { effects: self, of, axis, rubbing }
+        Friction { effects: self, of, axis, conditions }
     }
 }
 
@@ -78,17 +78,17 @@ impl<'a> Friction<'a> {
         place: Place,
         air: &AirAt,
     ) -> Self {
-        let rubbing = Rubbing {
+        let conditions = FrictionConditions {
             extension_m: place.extension,
             gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa),
-            rest_s: effects.memory.moving.axes[axis].rest_s,
+            rest_s: effects.memory.states.axes[axis].rest_s,
         };
-        Self { effects, of, axis, rubbing }
+        Self { effects, of, axis, conditions }
     }
 
     /// Terms of the sliding level in a direction (1 extending, -1 retracting) at a speed.
     pub(crate) fn sliding_level(&self, speed: f64, direction: f64) -> SlidingLevel {
-        let (on, at) = (&self.effects.on[self.axis], &self.rubbing);
+        let (on, at) = (&self.effects.on[self.axis], &self.conditions);
         let file = self.of.motion.levels.sliding_n[0];
         SlidingLevel {
             stribeck_friction: on.stribeck_friction.map_or(0.0, |effect| effect.term(speed)),
@@ -105,7 +105,7 @@ impl<'a> Friction<'a> {
 
     /// Terms of the break-away level in a direction, beside those of its sliding level.
     pub(crate) fn break_away_level(&self, direction: f64, sliding: &SlidingLevel) -> BreakAwayLevel {
-        let (on, at) = (&self.effects.on[self.axis], &self.rubbing);
+        let (on, at) = (&self.effects.on[self.axis], &self.conditions);
         let file = self.of.motion.levels.break_away_n[0];
         BreakAwayLevel {
             friction_asymmetry: on.friction_asymmetry.map_or(0.0, |effect| effect.term(file, direction)),
@@ -156,16 +156,16 @@ impl<'a> Friction<'a> {
     /// Friction of the bristles, along the axis's extension; `None` for an axis without them.
     pub(crate) fn bristles(&self, place: Place, force_n: f64) -> Option<Bristles> {
         let effect = self.effects.on[self.axis].presliding?;
-        let deflection_m = self.effects.memory.moving.axes[self.axis].deflection_m;
+        let deflection_m = self.effects.memory.states.axes[self.axis].deflection_m;
         let bristle = Bristle { velocity_m_per_s: place.velocity, deflection_m };
-        let under = self.under(place.velocity, place.velocity.abs(), force_n);
-        Some(Bristles { presliding: effect.force(bristle, under) })
+        let bristle_load = self.bristle_load(place.velocity, place.velocity.abs(), force_n);
+        Some(Bristles { presliding: effect.force(bristle, bristle_load) })
     }
 
-    /// Where a bristled axis stands: all that its friction depends on, its levels those at a speed.
-    pub(super) fn under(&self, velocity: f64, speed: f64, force_n: f64) -> Under {
+    /// Load of the bristles, with the friction levels at a speed.
+    pub(super) fn bristle_load(&self, velocity: f64, speed: f64, force_n: f64) -> BristleLoad {
         let direction = direction_of(if velocity == 0.0 { force_n } else { velocity });
-        Under {
+        BristleLoad {
             force_n,
             mass_kg: self.of.motion.masses_kg[self.axis],
             viscous_n_s_per_m: self.viscous(direction),

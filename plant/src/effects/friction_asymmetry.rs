@@ -15,7 +15,7 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); viscous friction that differs with the
 //! direction was found on the EMPS axis [Janot, Gautier, Brunot 2019]; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -31,7 +31,7 @@ impl Effect for FrictionAsymmetry {
         laws: &[Law::Friction],
         law: "sliding, break-away and viscous friction differ with the direction",
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); range: effects.md, textbook prior",
-        told_apart_by: &[ByHand::Tilting, ByHand::Pulling],
+        distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::Pulling],
         keys: &[EffectKey {
             name: "asymmetry_percent",
             unit: Unit::Percent,

@@ -23,7 +23,7 @@
 //! Almeida 2006, Reduced-order thermodynamic models for servo-pneumatic actuator chambers, Proc. IMechE I 220; range:
 //! textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -56,7 +56,7 @@ impl Effect for HeatExchange {
         law: "the gas of each chamber has its own temperature and exchanges heat with the wall",
         source: "energy balance, Beater 2007, Carneiro and de Almeida 2006; range: textbook prior",
         has_memory: true,
-        told_apart_by: &[ByHand::LockedHold, ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::LockedHold, ManualMeasurement::ConstantVolume],
         keys: &[EffectKey {
             name: "coefficient_w_per_m2_k",
             unit: Unit::WattPerSquareMetreKelvin,

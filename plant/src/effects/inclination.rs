@@ -14,7 +14,7 @@
 //!
 //! Source: Newton's second law; range: effects.md, textbook prior (5 kg at 45 degrees are 35 N, added weights more).
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -31,7 +31,7 @@ impl Effect for Inclination {
         laws: &[Law::Force],
         law: "a constant force along x: gravity on an inclined axis, a hanging load",
         source: "gravity along the axis; range: effects.md, textbook prior",
-        told_apart_by: &[ByHand::Tilting, ByHand::KnownWeight],
+        distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::KnownWeight],
         keys: &[EffectKey {
             name: "force_n",
             unit: Unit::Newton,

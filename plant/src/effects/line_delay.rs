@@ -15,7 +15,7 @@
 //! Source: Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336, connecting tubes (delay l / a and attenuation); range:
 //! textbook prior, tubes of 0.5 to 4 m.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -32,7 +32,7 @@ impl Effect for LineDelay {
         law: "what passes the valve reaches the chambers one acoustic travel time later",
         source: "Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
         has_memory: true,
-        told_apart_by: &[ByHand::PortPressure, ByHand::SpoolSignal],
+        distinguished_by: &[ManualMeasurement::PortPressure, ManualMeasurement::SpoolSignal],
         keys: &[EffectKey {
             name: "length_m",
             unit: Unit::Metre,

@@ -18,7 +18,7 @@
 //! Source: Darcy and Weisbach for gases, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, tubes; range:
 //! textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -36,7 +36,7 @@ impl Effect for LineResistance {
         laws: &[Law::Air],
         law: "the lines between valve and chambers are resistances: the drop grows with the flow squared and with 1/p",
         source: "pipe friction, Beater 2007; range: textbook prior",
-        told_apart_by: &[ByHand::PortPressure, ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::PortPressure, ManualMeasurement::ConstantVolume],
         keys: &[EffectKey {
             name: "drop_bar",
             unit: Unit::Bar,

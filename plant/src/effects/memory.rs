@@ -1,11 +1,11 @@
 //! What effects remember from step to step: small copyable states, and histories of what is delayed.
 //!
-//! A substep may be discarded and made again in parts; so the copyable half ([`Moving`]) goes through a step by value, and
+//! A substep may be discarded and made again in parts; so the copyable half ([`EffectStates`]) goes through a step by value, and
 //! histories grow only when a substep counts. All room is taken at construction: a step allocates nothing.
 
 use super::AxisEffects;
 use super::declared::DeclaredAt;
-use super::tabulated::Seen;
+use super::tabulated::AxisConditions;
 use crate::integrator::{Integrator, Lanes, PERIOD_S};
 use crate::lanes::{Axes, Pair};
 use crate::state::State;
@@ -13,10 +13,10 @@ use crate::state::State;
 /// Commands that a dead time can look back to, periods; the longest allowed is 10 ms.
 const COMMANDS: usize = 12;
 
-/// The copyable half of the memory.
+/// The copyable half of the memory: states of effects.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Moving {
-    pub(crate) axes: [AxisMoving; 2],
+pub(crate) struct EffectStates {
+    pub(crate) axes: [AxisEffectStates; 2],
     /// What the supply node lacks against the baseline's, Pa.
     pub(crate) droop_pa: f64,
     /// Its last rate, Pa/s: half a step ahead of it is where a midpoint is.
@@ -25,7 +25,7 @@ pub(crate) struct Moving {
 
 /// The copyable half of the memory of one axis; chambers as a, b.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct AxisMoving {
+pub(crate) struct AxisEffectStates {
     /// Spool at the end of the step.
     pub(crate) spool: f64,
     /// Output of the play between command and spool.
@@ -45,10 +45,10 @@ pub(crate) struct AxisMoving {
     /// Deflection of the bristles, m.
     pub(crate) deflection_m: f64,
     pub(crate) rest_s: f64,
-    /// What lagging sensors show: position, pressure a, pressure b.
-    pub(crate) shown: [f64; 3],
-    /// What they saw last.
-    pub(crate) seen: [f64; 3],
+    /// Outputs of lagging sensors: position, pressure a, pressure b.
+    pub(crate) lag_output: [f64; 3],
+    /// Their last inputs.
+    pub(crate) lag_input: [f64; 3],
 }
 
 /// The commands of the last periods, the newest first.
@@ -91,7 +91,7 @@ impl History {
         History { values: vec![value; steps.ceil() as usize + 2], newest: 0 }
     }
 
-    /// Moves all that is remembered.
+    /// Adds a value to all that is remembered.
     fn shift(&mut self, by: f64) {
         self.values.iter_mut().for_each(|value| *value += by);
     }
@@ -120,11 +120,11 @@ impl History {
     }
 }
 
-/// What tables and terms are over at the end of a step.
-pub(super) fn seen_at(of: &Integrator, lanes: &Lanes, axis: usize) -> Seen {
+/// Conditions of an axis at the end of a step.
+pub(super) fn axis_conditions_at(of: &Integrator, lanes: &Lanes, axis: usize) -> AxisConditions {
     let lane = |pair: Pair| pair.to_array()[axis];
     let volumes = [of.chambers.volume_a(lanes.extension), of.chambers.volume_b(lanes.extension)];
-    Seen {
+    AxisConditions {
         extension_m: lane(lanes.extension),
         velocity_m_per_s: lane(lanes.velocity),
         spool: lane(lanes.spool),
@@ -135,7 +135,7 @@ pub(super) fn seen_at(of: &Integrator, lanes: &Lanes, axis: usize) -> Seen {
 /// All that effects remember.
 #[derive(Debug, Clone)]
 pub(crate) struct Memory {
-    pub(crate) moving: Moving,
+    pub(crate) states: EffectStates,
     pub(crate) commands: [Commands; 2],
     /// Substeps since the plant began.
     pub(crate) substeps: u64,
@@ -160,26 +160,26 @@ impl Memory {
             let position_m =
                 if i == 0 { lane(lanes.extension) } else { of.motion.stroke_m - lane(lanes.extension) };
             let truths = [position_m, pressure_pa[0], pressure_pa[1]];
-            AxisMoving {
+            AxisEffectStates {
                 spool: lane(lanes.spool),
                 play: lane(lanes.spool),
                 normal_volume_m3: stored_j.map(|stored| lane(stored) / of.chambers.normal_pa),
                 port_flow_m3_per_s: lanes.air().map(|air| lane(air.flow)),
-                shown: truths,
-                seen: truths,
-                ..AxisMoving::default()
+                lag_output: truths,
+                lag_input: truths,
+                ..AxisEffectStates::default()
             }
         };
         let axes = [axis(0), axis(1)];
         let steps = |delay_s: f64| delay_s / of.substep_s();
         let lines = [0, 1].map(|i| {
-            let axis: &AxisMoving = &axes[i];
+            let axis: &AxisEffectStates = &axes[i];
             axis.port_flow_m3_per_s
                 .map(|flow| on[i].line_delay.map(|effect| History::new(flow, steps(effect.delay_s()) + 2.0)))
         });
         let channels = [0, 1].map(|i| {
-            let axis: &AxisMoving = &axes[i];
-            let values = [axis.seen[0], 0.0, axis.seen[1], axis.seen[2]];
+            let axis: &AxisEffectStates = &axes[i];
+            let values = [axis.lag_input[0], 0.0, axis.lag_input[1], axis.lag_input[2]];
             [0, 1, 2, 3].map(|channel: usize| {
                 on[i].time_skew[channel]
                     .map(|effect| History::new(values[channel], steps(effect.delay_s) + 1.0))
@@ -187,12 +187,13 @@ impl Memory {
         });
         let commands = [0, 1].map(|i: usize| Commands::new(axes[i].spool));
         let declared = [0, 1].map(|i: usize| {
-            let (seen, command) = (seen_at(of, &lanes, i), axes[i].spool);
-            let at = DeclaredAt { seen: &seen, command, time_s: 0.0, sensor_force_n: 0.0, kept: &[] };
+            let (conditions, command) = (axis_conditions_at(of, &lanes, i), axes[i].spool);
+            let at =
+                DeclaredAt { conditions: &conditions, command, time_s: 0.0, sensor_force_n: 0.0, kept: &[] };
             on[i].declared.begin(&at.values())
         });
         Memory {
-            moving: Moving { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 },
+            states: EffectStates { axes, droop_pa: 0.0, droop_pa_per_s: 0.0 },
             commands,
             substeps: 0,
             lines,
@@ -202,14 +203,14 @@ impl Memory {
         }
     }
 
-    /// What sensors saw (position, force, pressures of each axis), moved along with what they see now.
-    pub(crate) fn move_seen(&mut self, before: [[f64; 4]; 2], now: [[f64; 4]; 2]) {
-        for (axis, axis_states) in self.moving.axes.iter_mut().enumerate() {
+    /// Shifts the inputs that sensors remember (position, force, pressures of each axis) by the jump of their inputs.
+    pub(crate) fn shift_sensor_histories(&mut self, before: [[f64; 4]; 2], now: [[f64; 4]; 2]) {
+        for (axis, axis_states) in self.states.axes.iter_mut().enumerate() {
             let by: [f64; 4] = std::array::from_fn(|channel| now[axis][channel] - before[axis][channel]);
             let [position, _, a, b] = by;
             for (i, by) in [position, a, b].into_iter().enumerate() {
-                axis_states.shown[i] += by;
-                axis_states.seen[i] += by;
+                axis_states.lag_output[i] += by;
+                axis_states.lag_input[i] += by;
             }
             for (history, by) in self.channels[axis].iter_mut().zip(by) {
                 history.iter_mut().for_each(|history| history.shift(by));
@@ -219,7 +220,7 @@ impl Memory {
 
     /// The masses that have, in the new state, the temperatures of the old one.
     pub(crate) fn keep_temperatures(&mut self, old: &State, new: &State) {
-        for ((axis_states, old), new) in self.moving.axes.iter_mut().zip(&old.axes).zip(&new.axes) {
+        for ((axis_states, old), new) in self.states.axes.iter_mut().zip(&old.axes).zip(&new.axes) {
             axis_states.normal_volume_m3[0] *= new.stored_air_a_j / old.stored_air_a_j;
             axis_states.normal_volume_m3[1] *= new.stored_air_b_j / old.stored_air_b_j;
         }

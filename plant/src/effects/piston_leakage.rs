@@ -16,7 +16,7 @@
 //! chambers also in Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior.
 
 use super::laminar_gap::LaminarGap;
-use super::sheet::{ByHand, Effect, Group, Law, Sheet};
+use super::sheet::{Effect, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,7 +31,7 @@ impl Effect for PistonLeakage {
         laws: &[Law::StoredAir],
         law: "laminar leakage past the piston seal, from chamber to chamber",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
-        told_apart_by: &[ByHand::LockedHold],
+        distinguished_by: &[ManualMeasurement::LockedHold],
         keys: &[LaminarGap::KEY],
         ..Sheet::USUAL
     };

@@ -18,7 +18,7 @@
 //! effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -38,7 +38,7 @@ impl Effect for PositionDependentForce {
         laws: &[Law::Force],
         law: "a force over x that does not flip with the velocity: hose or cable spring, cogging",
         source: "Hooke's law, cogging as a sine of its pitch; range: effects.md, textbook prior",
-        told_apart_by: &[ByHand::Tilting, ByHand::Pulling],
+        distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::Pulling],
         keys: &[
             EffectKey {
                 name: "spring_n",

@@ -23,7 +23,7 @@
 //! and range: effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -48,7 +48,7 @@ impl Effect for PositionDependentFriction {
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); shapes and range: effects.md, textbook prior",
         // A bump elsewhere does not resemble the one in the middle.
         also_screened: &[-0.45, 0.45],
-        told_apart_by: &[ByHand::Pulling],
+        distinguished_by: &[ManualMeasurement::Pulling],
         keys: &[
             EffectKey {
                 name: "bump_n",

@@ -12,7 +12,7 @@
 //!
 //! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Element, Group, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -28,7 +28,7 @@ impl Effect for PositionSensorGain {
         law: "the position sensor reads too much by a share",
         source: "gain error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Gain, Some(Element::Position))),
-        told_apart_by: &[ByHand::PressedEnds],
+        distinguished_by: &[ManualMeasurement::PressedEnds],
         keys: &[EffectKey {
             name: "gain_percent",
             unit: Unit::Percent,

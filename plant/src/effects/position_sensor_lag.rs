@@ -18,7 +18,7 @@
 //! Source: first-order lag, filter of the transducer; range 0.5 to 8 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{ByHand, Effect, EffectKey, Element, Group, Law, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Element, Group, Law, ManualMeasurement, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -36,7 +36,7 @@ impl Effect for PositionSensorLag {
         source: "first-order lag, filter of the transducer; range: effects.md, textbook prior",
         has_memory: true,
         sensor_error: Some((SensorError::Delay, Some(Element::Position))),
-        told_apart_by: &[ByHand::PositionSensor],
+        distinguished_by: &[ManualMeasurement::PositionSensor],
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,
@@ -55,8 +55,8 @@ impl Effect for PositionSensorLag {
 
 impl PositionSensorLag {
     /// What it shows at the end of a span, s, over which the truth goes in a straight line; all in m.
-    pub(crate) fn advance(&self, shown: f64, truth_from: f64, truth_to: f64, span_s: f64) -> f64 {
-        first_order::advance(self.time_constant_s, shown, truth_from, truth_to, span_s)
+    pub(crate) fn advance(&self, output: f64, truth_from: f64, truth_to: f64, span_s: f64) -> f64 {
+        first_order::advance(self.time_constant_s, output, truth_from, truth_to, span_s)
     }
 }
 

@@ -12,7 +12,7 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Element, Group, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,7 +29,7 @@ impl Effect for PositionSensorOffset {
         law: "the position sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Offset, Some(Element::Position))),
-        told_apart_by: &[ByHand::PressedEnds, ByHand::Uncoupling],
+        distinguished_by: &[ManualMeasurement::PressedEnds, ManualMeasurement::Uncoupling],
         keys: &[EffectKey {
             name: "offset_mm",
             unit: Unit::Millimetre,

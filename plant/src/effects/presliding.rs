@@ -57,7 +57,7 @@
 //! state elastoplastic friction models", IEEE Trans. Automatic Control 47(5). Fading form of s_1: ours, the simplest that is
 //! passive and gives psi in closed form. v_s and the range of s_0: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -78,7 +78,7 @@ pub(crate) struct Presliding {
     pub(crate) stiffness_n_per_m: f64,
 }
 
-/// What moves: one piston on its bristles, along its own extension.
+/// State of one piston on its bristles, along its own extension.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Bristle {
     /// Of the rod.
@@ -87,9 +87,9 @@ pub(crate) struct Bristle {
     pub(crate) deflection_m: f64,
 }
 
-/// What acts over a span, all of it held.
+/// Force, mass and friction levels over a span, held constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Under {
+pub(crate) struct BristleLoad {
     /// All forces but friction, along the extension.
     pub(crate) force_n: f64,
     /// All that moves with the piston.
@@ -111,7 +111,7 @@ impl Effect for Presliding {
         source: "Canudas de Wit, Olsson, Astrom, Lischinsky 1995, IEEE TAC 40(3); range: effects.md, textbook prior",
         has_memory: true,
         excited_by: Excitation::Creeping,
-        told_apart_by: &[ByHand::Uncoupling, ByHand::Pulling],
+        distinguished_by: &[ManualMeasurement::Uncoupling, ManualMeasurement::Pulling],
         keys: &[EffectKey {
             name: "stiffness_n_per_m",
             unit: Unit::NewtonPerMetre,
@@ -132,20 +132,20 @@ impl Effect for Presliding {
 
 impl Presliding {
     /// Moves piston and bristles through a span, s: the displacement along the extension, m, and what is there at the end.
-    pub(crate) fn advance(&self, from: Bristle, under: Under, span_s: f64) -> (f64, Bristle) {
-        let inertia = 2.0 * under.mass_kg / span_s;
+    pub(crate) fn advance(&self, from: Bristle, load: BristleLoad, span_s: f64) -> (f64, Bristle) {
+        let inertia = 2.0 * load.mass_kg / span_s;
         let elastic_n = self.stiffness_n_per_m * from.deflection_m;
-        let push_n = under.force_n + inertia * from.velocity_m_per_s - elastic_n;
+        let push_n = load.force_n + inertia * from.velocity_m_per_s - elastic_n;
         let direction = push_n.signum();
         let balance = |level_n: f64| Balance {
-            slope: inertia + under.viscous_n_s_per_m,
+            slope: inertia + load.viscous_n_s_per_m,
             push_n: push_n.abs(),
             room_n: level_n - direction * elastic_n,
             relaxation: span_s * self.stiffness_n_per_m / level_n,
-            fading: self.damping(&under) / level_n,
+            fading: self.damping(&load) / level_n,
         };
-        let predicted = balance(level(&under, from.velocity_m_per_s));
-        let level_n = level(&under, predicted.closer(predicted.bound()));
+        let predicted = balance(level(&load, from.velocity_m_per_s));
+        let level_n = level(&load, predicted.closer(predicted.bound()));
         let balance = balance(level_n);
         let speed = (0..NEWTON_STEPS).fold(balance.bound(), |speed, _| balance.closer(speed));
         let speed = balance.not_above(speed);
@@ -160,27 +160,27 @@ impl Presliding {
     }
 
     /// The bristles' force on the piston at an instant, N along the extension: against the motion while it slides.
-    pub(crate) fn force(&self, bristle: Bristle, under: Under) -> f64 {
-        let level_n = level(&under, bristle.velocity_m_per_s);
+    pub(crate) fn force(&self, bristle: Bristle, load: BristleLoad) -> f64 {
+        let level_n = level(&load, bristle.velocity_m_per_s);
         let elastic_n = self.stiffness_n_per_m * bristle.deflection_m;
         let speed = bristle.velocity_m_per_s.abs();
-        let fading = self.damping(&under) / level_n * speed;
+        let fading = self.damping(&load) / level_n * speed;
         // s_1(v) dz/dt, with dz/dt = v (1 - y).
         let room_n = level_n * bristle.velocity_m_per_s.signum() - elastic_n;
         -(elastic_n + fading / (1.0 + fading) * room_n)
     }
 
     /// s_1 at rest, N s/m.
-    fn damping(&self, under: &Under) -> f64 {
-        2.0 * DAMPING_RATIO * (self.stiffness_n_per_m * under.mass_kg).sqrt()
+    fn damping(&self, load: &BristleLoad) -> f64 {
+        2.0 * DAMPING_RATIO * (self.stiffness_n_per_m * load.mass_kg).sqrt()
     }
 }
 
 /// g(v), N: what the bristles bear at this velocity, m/s.
-fn level(under: &Under, velocity_m_per_s: f64) -> f64 {
+fn level(load: &BristleLoad, velocity_m_per_s: f64) -> f64 {
     let ratio = velocity_m_per_s / STRIBECK_M_PER_S;
-    let excess_n = under.break_away_n - under.sliding_n;
-    (under.sliding_n + excess_n * libm::exp(-ratio * ratio)).max(LEAST_LEVEL_N)
+    let excess_n = load.break_away_n - load.sliding_n;
+    (load.sliding_n + excess_n * libm::exp(-ratio * ratio)).max(LEAST_LEVEL_N)
 }
 
 /// `H(s) = slope s + room (1 - psi(s)) = push`, of the module's head, for the speed s >= 0 at the midpoint.
@@ -251,8 +251,8 @@ mod tests {
         Presliding { stiffness_n_per_m }
     }
 
-    fn under(force_n: f64) -> Under {
-        Under { force_n, mass_kg: 5.0, viscous_n_s_per_m: 0.0, sliding_n: 26.0, break_away_n: 35.0 }
+    fn load(force_n: f64) -> BristleLoad {
+        BristleLoad { force_n, mass_kg: 5.0, viscous_n_s_per_m: 0.0, sliding_n: 26.0, break_away_n: 35.0 }
     }
 
     fn at(velocity_m_per_s: f64, deflection_m: f64) -> Bristle {
@@ -260,30 +260,30 @@ mod tests {
     }
 
     /// Many steps: where it came, and what is there.
-    fn run(of: Presliding, from: Bristle, under: Under, span_s: f64, steps: u32) -> (f64, Bristle) {
+    fn run(of: Presliding, from: Bristle, load: BristleLoad, span_s: f64, steps: u32) -> (f64, Bristle) {
         (0..steps).fold((0.0, from), |(x, bristle), _| {
-            let (way, next) = of.advance(bristle, under, span_s);
+            let (way, next) = of.advance(bristle, load, span_s);
             (x + way, next)
         })
     }
 
     /// The equations as printed, by the classical Runge-Kutta method: x, v, z.
-    fn printed(s_0: f64, under: Under, [_, v, z]: [f64; 3]) -> [f64; 3] {
-        let g = under.sliding_n + (under.break_away_n - under.sliding_n) * (-(v / 1e-3).powi(2)).exp();
-        let s_1 = 1.4 * (s_0 * under.mass_kg).sqrt();
+    fn printed(s_0: f64, load: BristleLoad, [_, v, z]: [f64; 3]) -> [f64; 3] {
+        let g = load.sliding_n + (load.break_away_n - load.sliding_n) * (-(v / 1e-3).powi(2)).exp();
+        let s_1 = 1.4 * (s_0 * load.mass_kg).sqrt();
         let dz = v - v.abs() * s_0 * z / g;
         let friction = s_0 * z + s_1 * g / (g + s_1 * v.abs()) * dz;
-        [v, (under.force_n - under.viscous_n_s_per_m * v - friction) / under.mass_kg, dz]
+        [v, (load.force_n - load.viscous_n_s_per_m * v - friction) / load.mass_kg, dz]
     }
 
-    fn runge_kutta(s_0: f64, under: Under, from: [f64; 3], span_s: f64, steps: u32) -> [f64; 3] {
+    fn runge_kutta(s_0: f64, load: BristleLoad, from: [f64; 3], span_s: f64, steps: u32) -> [f64; 3] {
         let plus = |y: [f64; 3], k: [f64; 3], h: f64| std::array::from_fn(|i| y[i] + h * k[i]);
         let h = span_s / f64::from(steps);
         (0..steps).fold(from, |y, _| {
-            let k1 = printed(s_0, under, y);
-            let k2 = printed(s_0, under, plus(y, k1, h / 2.0));
-            let k3 = printed(s_0, under, plus(y, k2, h / 2.0));
-            let k4 = printed(s_0, under, plus(y, k3, h));
+            let k1 = printed(s_0, load, y);
+            let k2 = printed(s_0, load, plus(y, k1, h / 2.0));
+            let k3 = printed(s_0, load, plus(y, k2, h / 2.0));
+            let k4 = printed(s_0, load, plus(y, k3, h));
             std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]))
         })
     }
@@ -292,9 +292,9 @@ mod tests {
     fn the_step_is_of_second_order() {
         // A blow of 34 N on a piston that slides back: it stops, bends the bristles the other way, breaks away.
         let (s_0, start) = (1e5, at(-0.003, -2e-4));
-        let truth = runge_kutta(s_0, under(34.0), [0.0, -0.003, -2e-4], 0.02, 20_000);
+        let truth = runge_kutta(s_0, load(34.0), [0.0, -0.003, -2e-4], 0.02, 20_000);
         let error = |steps: u32| {
-            let (x, end) = run(presliding(s_0), start, under(34.0), 0.02 / f64::from(steps), steps);
+            let (x, end) = run(presliding(s_0), start, load(34.0), 0.02 / f64::from(steps), steps);
             [x - truth[0], end.velocity_m_per_s - truth[1], end.deflection_m - truth[2]].map(f64::abs)
         };
         let [coarse, fine] = [error(400), error(800)];
@@ -311,7 +311,7 @@ mod tests {
         for s_0 in [3e4, 1e5, 1e6, 1e7, 3e7] {
             for mass_kg in [1.5, 5.0, 25.0] {
                 for span_s in [12.5e-6, LONGEST_S] {
-                    let pushed = Under { mass_kg, ..under(20.0) };
+                    let pushed = BristleLoad { mass_kg, ..load(20.0) };
                     let (_, end) = run(presliding(s_0), at(0.0, 0.0), pushed, span_s, 200_000);
                     // The slowest: decay at 0.49 sqrt(s_0 / m (1 - 20 / 35)) > 11 1/s over 2.5 s is 1e-12 of F / s_0.
                     let off = (end.deflection_m * s_0 - 20.0).abs();
@@ -326,14 +326,14 @@ mod tests {
     fn in_balance_it_stays_to_the_bit() {
         // 2^-15 m * 2^20 N/m = 32 N.
         let rest = at(0.0, 1.0 / 32768.0);
-        assert_eq!(presliding(1_048_576.0).advance(rest, under(32.0), LONGEST_S), (0.0, rest));
-        assert_eq!(presliding(1e5).advance(at(0.0, 0.0), under(0.0), LONGEST_S), (0.0, at(0.0, 0.0)));
+        assert_eq!(presliding(1_048_576.0).advance(rest, load(32.0), LONGEST_S), (0.0, rest));
+        assert_eq!(presliding(1e5).advance(at(0.0, 0.0), load(0.0), LONGEST_S), (0.0, at(0.0, 0.0)));
     }
 
     #[test]
     fn above_break_away_it_slides_with_the_friction_of_its_speed() {
         for s_0 in [3e4, 3e7] {
-            let pushed = Under { viscous_n_s_per_m: 1100.0, ..under(136.0) };
+            let pushed = BristleLoad { viscous_n_s_per_m: 1100.0, ..load(136.0) };
             let (way, end) = run(presliding(s_0), at(0.0, 0.0), pushed, LONGEST_S, 10_000);
             // (136 - 26) N / 1100 N s/m; 1 s is 220 time constants of the mass.
             assert!((end.velocity_m_per_s - 0.1).abs() < 1e-12, "s_0 = {s_0}: {end:?}");
@@ -351,7 +351,7 @@ mod tests {
         assert_eq!(form(0.0), 0.0);
         let (mut x, mut bristle) = (0.0, at(0.0, 0.0));
         for step in 0..steps {
-            let loaded = under(17.5 * f64::from(step) / f64::from(steps));
+            let loaded = load(17.5 * f64::from(step) / f64::from(steps));
             let (way, next) = presliding(s_0).advance(bristle, loaded, LONGEST_S);
             (x, bristle) = (x + way, next);
         }
@@ -365,7 +365,7 @@ mod tests {
     fn it_tends_to_stick_and_slip_as_the_bristles_stiffen() {
         for s_0 in [3e5, 3e6, 3e7] {
             // Stick and slip stops after m v^2 / (2 F_sli); the bristles take up F_sli / s_0 first and give back as much at last.
-            let (way, end) = run(presliding(s_0), at(0.1, 0.0), under(0.0), LONGEST_S, 10_000);
+            let (way, end) = run(presliding(s_0), at(0.1, 0.0), load(0.0), LONGEST_S, 10_000);
             let stick_slip = 5.0 * 0.01 / (2.0 * 26.0);
             // 0.1 um for the last millimetre per second, where 35 N brake 5 kg in place of 26.
             assert!((way - stick_slip).abs() < 2.0 * 35.0 / s_0 + 1e-7, "s_0 = {s_0}: {way:e} m");
@@ -374,7 +374,7 @@ mod tests {
             // does not slide; at 36 N it does.
             let reached = |most_n: f64| {
                 let ramp = (0..60_000).fold((0.0, at(0.0, 0.0)), |(x, bristle), step| {
-                    let loaded = under(most_n * (f64::from(step) / 50_000.0).min(1.0));
+                    let loaded = load(most_n * (f64::from(step) / 50_000.0).min(1.0));
                     let (way, next) = presliding(s_0).advance(bristle, loaded, LONGEST_S);
                     (x + way, next)
                 });
@@ -390,7 +390,7 @@ mod tests {
         for [break_away_n, sliding_n] in [[35.0, 26.0], [26.0, 26.0], [52.0, 26.0], [5.0, 1.0], [0.0, 0.0]] {
             for (s_0, mass_kg) in [(3e4, 0.5), (3e4, 25.0), (1e6, 5.0), (3e7, 0.5), (3e7, 25.0)] {
                 for (push_n, share) in (0..400).map(|i| (f64::from(i % 40), f64::from(i / 40) / 5.0 - 1.0)) {
-                    let pushed = Under { mass_kg, sliding_n, break_away_n, ..under(0.0) };
+                    let pushed = BristleLoad { mass_kg, sliding_n, break_away_n, ..load(0.0) };
                     let level_n = level(&pushed, push_n / 1e3);
                     let balance = Balance {
                         slope: 2.0 * mass_kg / LONGEST_S,
@@ -414,7 +414,7 @@ mod tests {
     }
 
     /// Any span, rig and load, also those where a level falls to nothing.
-    fn any_case() -> impl Strategy<Value = (f64, Under, Bristle, f64)> {
+    fn any_case() -> impl Strategy<Value = (f64, BristleLoad, Bristle, f64)> {
         let levels = (0.0..300.0_f64, 0.0..1.0_f64);
         let rig = (3e4_f64.ln()..3e7_f64.ln(), 0.5..25.0_f64, 0.0..1e4_f64, levels);
         let load = prop_oneof![-60.0..60.0_f64, -3000.0..3000.0_f64];
@@ -423,8 +423,8 @@ mod tests {
             let (log_s_0, mass_kg, viscous_n_s_per_m, (break_away_n, sliding)) = rig;
             let s_0 = log_s_0.exp();
             let sliding_n = break_away_n * sliding;
-            let under = Under { force_n, mass_kg, viscous_n_s_per_m, sliding_n, break_away_n };
-            (s_0, under, at(speed, share * break_away_n / s_0), span_s)
+            let load = BristleLoad { force_n, mass_kg, viscous_n_s_per_m, sliding_n, break_away_n };
+            (s_0, load, at(speed, share * break_away_n / s_0), span_s)
         })
     }
 
@@ -432,37 +432,37 @@ mod tests {
         #![proptest_config(ProptestConfig { cases: 20_000, failure_persistence: None, ..ProptestConfig::default() })]
 
         #[test]
-        fn friction_never_adds_energy((s_0, under, start, span_s) in any_case()) {
+        fn friction_never_adds_energy((s_0, load, start, span_s) in any_case()) {
             let energy = |b: Bristle| {
-                let kinetic = under.mass_kg * b.velocity_m_per_s * b.velocity_m_per_s;
+                let kinetic = load.mass_kg * b.velocity_m_per_s * b.velocity_m_per_s;
                 (kinetic + s_0 * b.deflection_m * b.deflection_m) / 2.0
             };
-            let (way, end) = presliding(s_0).advance(start, under, span_s);
+            let (way, end) = presliding(s_0).advance(start, load, span_s);
             let gained = energy(end) - energy(start);
-            let viscous = under.viscous_n_s_per_m * way * way / span_s;
-            let work = under.force_n * way - viscous;
+            let viscous = load.viscous_n_s_per_m * way * way / span_s;
+            let work = load.force_n * way - viscous;
             // Roundings of the energies.
             let rounding = 1e-13 * (energy(start) + energy(end) + work.abs() + viscous);
             prop_assert!(gained <= work + rounding, "{gained:e} J > {work:e} J");
         }
 
         #[test]
-        fn the_deflection_stays_below_break_away((s_0, under, start, span_s) in any_case()) {
-            let (_, end) = presliding(s_0).advance(start, under, span_s);
-            let most = under.break_away_n.max(LEAST_LEVEL_N) / s_0;
+        fn the_deflection_stays_below_break_away((s_0, load, start, span_s) in any_case()) {
+            let (_, end) = presliding(s_0).advance(start, load, span_s);
+            let most = load.break_away_n.max(LEAST_LEVEL_N) / s_0;
             // One rounding of the sum.
             prop_assert!(end.deflection_m.abs() <= most * (1.0 + 1e-15), "{end:?} beyond {most:e}");
         }
 
         #[test]
-        fn the_force_is_bounded_and_opposes_sliding((s_0, under, start, _) in any_case()) {
-            let force = presliding(s_0).force(start, under);
+        fn the_force_is_bounded_and_opposes_sliding((s_0, load, start, _) in any_case()) {
+            let force = presliding(s_0).force(start, load);
             // The damping adds at most as much as the level leaves room: g - d s_0 z, whichever its sign.
-            let most = under.break_away_n.max(LEAST_LEVEL_N);
+            let most = load.break_away_n.max(LEAST_LEVEL_N);
             prop_assert!(force.abs() <= most * (1.0 + 1e-15));
             let velocity = start.velocity_m_per_s;
-            let settled = at(velocity, velocity.signum() * level(&under, velocity) / s_0);
-            prop_assert!(presliding(s_0).force(settled, under) * velocity <= 0.0);
+            let settled = at(velocity, velocity.signum() * level(&load, velocity) / s_0);
+            prop_assert!(presliding(s_0).force(settled, load) * velocity <= 0.0);
         }
     }
 }

@@ -15,7 +15,7 @@
 //! Source: growth of a pneumatic cylinder's friction with its pressures, measured: Tran, Yanada, "Dynamic friction behaviors
 //! of pneumatic cylinders", Intelligent Control and Automation 4(2), 2013; linear form and range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -32,7 +32,7 @@ impl Effect for PressureDependentFriction {
         laws: &[Law::Friction],
         law: "friction grows with the sum of the gauge pressures that press the seals on",
         source: "Tran, Yanada 2013, Intelligent Control and Automation 4(2); linear form and range: effects.md, textbook prior",
-        told_apart_by: &[ByHand::Pulling],
+        distinguished_by: &[ManualMeasurement::Pulling],
         keys: &[EffectKey {
             name: "slope_n_per_bar",
             unit: Unit::NewtonPerBar,

@@ -12,7 +12,7 @@
 //!
 //! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, PlaceKind, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Group, ManualMeasurement, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,7 +29,7 @@ impl Effect for PressureSensorGain {
         law: "the pressure sensor reads too much by a share",
         source: "gain error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Gain, None)),
-        told_apart_by: &[ByHand::Venting, ByHand::Tilting],
+        distinguished_by: &[ManualMeasurement::Venting, ManualMeasurement::Tilting],
         keys: &[EffectKey {
             name: "gain_percent",
             unit: Unit::Percent,

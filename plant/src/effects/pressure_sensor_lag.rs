@@ -18,7 +18,7 @@
 //! Source: first-order lag, sense line as one resistance and one volume; range 1 to 10 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, PlaceKind, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -37,7 +37,7 @@ impl Effect for PressureSensorLag {
         source: "first-order lag, sense line as one resistance and one volume; range: effects.md, textbook prior",
         has_memory: true,
         sensor_error: Some((SensorError::Delay, None)),
-        told_apart_by: &[ByHand::PortPressure],
+        distinguished_by: &[ManualMeasurement::PortPressure],
         keys: &[EffectKey {
             name: "time_constant_ms",
             unit: Unit::Millisecond,
@@ -56,8 +56,8 @@ impl Effect for PressureSensorLag {
 
 impl PressureSensorLag {
     /// What it shows at the end of a span, s, over which the truth goes in a straight line; all in Pa.
-    pub(crate) fn advance(&self, shown: f64, truth_from: f64, truth_to: f64, span_s: f64) -> f64 {
-        first_order::advance(self.time_constant_s, shown, truth_from, truth_to, span_s)
+    pub(crate) fn advance(&self, output: f64, truth_from: f64, truth_to: f64, span_s: f64) -> f64 {
+        first_order::advance(self.time_constant_s, output, truth_from, truth_to, span_s)
     }
 }
 

@@ -12,7 +12,7 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, PlaceKind, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Group, ManualMeasurement, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -30,7 +30,7 @@ impl Effect for PressureSensorOffset {
         law: "the pressure sensor reads too much by a constant",
         source: "zero error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Offset, None)),
-        told_apart_by: &[ByHand::Venting, ByHand::Tilting],
+        distinguished_by: &[ManualMeasurement::Venting, ManualMeasurement::Tilting],
         keys: &[EffectKey {
             name: "offset_mbar",
             unit: Unit::Millibar,

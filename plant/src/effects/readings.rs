@@ -3,9 +3,9 @@
 use super::OpenBalance;
 use super::acting::Effects;
 use super::declared::{DeclaredAt, Target};
-use super::memory::seen_at;
+use super::memory::axis_conditions_at;
 use super::sums::{ForceReading, PositionReading, PressureReading};
-use super::tabulated::Seen;
+use super::tabulated::AxisConditions;
 use crate::integrator::{Integrator, Lanes};
 
 impl Effects {
@@ -24,7 +24,7 @@ impl Effects {
             time_skew: self.skew(axis, 0, truth),
             position_sensor_lag: on
                 .position_sensor_lag
-                .map_or(0.0, |_| self.memory.moving.axes[axis].shown[0] - truth),
+                .map_or(0.0, |_| self.memory.states.axes[axis].lag_output[0] - truth),
             position_sensor_gain: on.position_sensor_gain.map_or(0.0, |effect| effect.term(truth)),
             position_sensor_offset: on.position_sensor_offset.map_or(0.0, |effect| effect.offset_m),
             declared_reading: on.declared.reading(Target::Position, at),
@@ -56,7 +56,7 @@ impl Effects {
         PressureReading {
             time_skew: self.skew(axis, 2 + chamber, truth),
             pressure_sensor_lag: on.pressure_sensor_lag[chamber]
-                .map_or(0.0, |_| self.memory.moving.axes[axis].shown[1 + chamber] - truth),
+                .map_or(0.0, |_| self.memory.states.axes[axis].lag_output[1 + chamber] - truth),
             pressure_sensor_gain: on.pressure_sensor_gain[chamber].map_or(0.0, |effect| effect.term(truth)),
             pressure_sensor_offset: on.pressure_sensor_offset[chamber].map_or(0.0, |effect| effect.offset_pa),
             declared_reading: on.declared.reading([Target::PressureA, Target::PressureB][chamber], at),
@@ -67,18 +67,17 @@ impl Effects {
     /// Remembers what sensors of an axis will show of this instant.
     pub(super) fn keep_readings(&mut self, of: &Integrator, axis: usize, lanes: &Lanes) {
         let span_s = self.substep_s;
-        let Seen { extension_m, pressure_pa: [a, b], .. } = seen_at(of, lanes, axis);
+        let AxisConditions { extension_m, pressure_pa: [a, b], .. } = axis_conditions_at(of, lanes, axis);
         let x = if axis == 0 { extension_m } else { self.stroke_m - extension_m };
-        let (on, axis_states) = (&self.on[axis], &mut self.memory.moving.axes[axis]);
+        let (on, axis_states) = (&self.on[axis], &mut self.memory.states.axes[axis]);
         for (i, truth) in [x, a, b].into_iter().enumerate() {
-            let (shown, seen) = (axis_states.shown[i], axis_states.seen[i]);
-            axis_states.shown[i] = match i {
-                0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(shown, seen, truth, span_s)),
-                _ => {
-                    on.pressure_sensor_lag[i - 1].map_or(truth, |lag| lag.advance(shown, seen, truth, span_s))
-                }
+            let (output, input) = (axis_states.lag_output[i], axis_states.lag_input[i]);
+            axis_states.lag_output[i] = match i {
+                0 => on.position_sensor_lag.map_or(truth, |lag| lag.advance(output, input, truth, span_s)),
+                _ => on.pressure_sensor_lag[i - 1]
+                    .map_or(truth, |lag| lag.advance(output, input, truth, span_s)),
             };
-            axis_states.seen[i] = truth;
+            axis_states.lag_input[i] = truth;
         }
         for (channel, truth) in [(0, x), (2, a), (3, b)] {
             self.memory.channels[axis][channel].iter_mut().for_each(|history| history.push(truth));

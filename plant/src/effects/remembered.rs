@@ -18,9 +18,9 @@ pub(crate) const STEP: (&str, &str, [f64; 2]) = ("dt", "s", [1e-6, 1e-3]);
 /// Variables of start and update before what is remembered.
 const BEFORE: usize = VARIABLES.len();
 
-/// A value that a term keeps, as a file declares it, checked.
+/// A variable that a term keeps from step to step, as a file declares it, checked.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Remembered {
+pub struct MemoryVariable {
     /// Its name in the expressions.
     pub name: String,
     pub(crate) unit: Unit,
@@ -32,7 +32,7 @@ pub struct Remembered {
     pub(crate) update_formula: Formula,
 }
 
-impl Remembered {
+impl MemoryVariable {
     pub(crate) fn set(&mut self, parameters_si: &[f64]) {
         self.start_formula.set(parameters_si);
         self.update_formula.set(parameters_si);
@@ -43,21 +43,21 @@ impl Remembered {
         [&self.start_formula, &self.update_formula].into_iter().any(|formula| formula.reads(SENSOR_FORCE))
     }
 
-    pub(crate) fn kept(&self) -> Kept {
+    pub(crate) fn law(&self) -> MemoryLaw {
         let range_si = self.range.map(|end| end * self.unit.factor);
-        Kept { start: self.start_formula.clone(), update: self.update_formula.clone(), range_si }
+        MemoryLaw { start: self.start_formula.clone(), update: self.update_formula.clone(), range_si }
     }
 }
 
-/// What the plant needs of it.
+/// Start and update of a memory variable, in SI.
 #[derive(Debug, Clone)]
-pub(crate) struct Kept {
+pub(crate) struct MemoryLaw {
     start: Formula,
     update: Formula,
     range_si: [f64; 2],
 }
 
-impl Kept {
+impl MemoryLaw {
     /// Its value where the plant begins, at these [`VARIABLES`].
     pub(crate) fn begin(&self, values: &[f64; VARIABLES.len()]) -> f64 {
         let [least, most] = self.range_si;
@@ -66,7 +66,7 @@ impl Kept {
 }
 
 /// Renews what one term keeps.
-pub(crate) fn renew(laws: &[Kept], values: &[f64; VARIABLES.len()], step_s: f64, kept: &mut [f64]) {
+pub(crate) fn renew(laws: &[MemoryLaw], values: &[f64; VARIABLES.len()], step_s: f64, kept: &mut [f64]) {
     let mut all = [0.0; BEFORE + MOST_REMEMBERED + 1];
     all[..BEFORE].copy_from_slice(values);
     all[BEFORE..][..kept.len()].copy_from_slice(kept);

@@ -17,7 +17,7 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, on rising static friction; logarithmic growth:
 //! Dieterich, "Time-dependent friction in rocks", J. Geophysical Research 77(20), 1972; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -37,7 +37,7 @@ impl Effect for RestTimeDependentBreakAway {
         law: "the break-away force grows with the logarithm of the time at rest",
         source: "Armstrong-Helouvry et al. 1994, Automatica 30(7); Dieterich 1972; range: effects.md, textbook prior",
         has_memory: true,
-        told_apart_by: &[ByHand::Pulling],
+        distinguished_by: &[ManualMeasurement::Pulling],
         keys: &[
             EffectKey {
                 name: "growth_percent",

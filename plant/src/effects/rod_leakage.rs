@@ -14,7 +14,7 @@
 //! Source: laminar gap flow of a gas, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::laminar_gap::LaminarGap;
-use super::sheet::{ByHand, Effect, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, Group, Law, ManualMeasurement, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,7 +30,7 @@ impl Effect for RodLeakage {
         laws: &[Law::StoredAir],
         law: "laminar leakage to the atmosphere: past the rod seal out of b, past the cap's static seal out of a",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
-        told_apart_by: &[ByHand::LockedHold],
+        distinguished_by: &[ManualMeasurement::LockedHold],
         keys: &[LaminarGap::KEY],
         ..Sheet::USUAL
     };

@@ -4,8 +4,8 @@
 
 use super::acting::Effects;
 use super::declared::DeclaredAt;
-use super::memory::seen_at;
-use super::tabulated::Seen;
+use super::memory::axis_conditions_at;
+use super::tabulated::AxisConditions;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
 use crate::truth::TrueForces;
@@ -15,14 +15,18 @@ impl Effects {
     pub(super) fn begin_forces(&mut self, of: &Integrator, lanes: &Lanes, linked: bool) {
         self.see_forces(of, lanes, Pair::both(0.0), linked);
         for axis in (0..2).filter(|axis| self.on[*axis].declared.follows_sensor) {
-            let values = self.declared_in_step(axis, &seen_at(of, lanes, axis)).values();
+            let values = self.declared_in_step(axis, &axis_conditions_at(of, lanes, axis)).values();
             self.memory.declared[axis] = self.on[axis].declared.begin(&values);
         }
     }
 
     /// What declared terms of a force, of a flow and of what is kept are over.
-    pub(crate) fn declared_in_step<'a>(&'a self, axis: usize, seen: &'a Seen) -> DeclaredAt<'a> {
-        self.declared_at(axis, seen, self.memory.sensor_force_n[axis])
+    pub(crate) fn declared_in_step<'a>(
+        &'a self,
+        axis: usize,
+        conditions: &'a AxisConditions,
+    ) -> DeclaredAt<'a> {
+        self.declared_at(axis, conditions, self.memory.sensor_force_n[axis])
     }
 
     /// Keeps what the force sensors should show, where a declared term is over it in a step.
@@ -37,11 +41,11 @@ impl Effects {
     pub(crate) fn declared_at<'a>(
         &'a self,
         axis: usize,
-        seen: &'a Seen,
+        conditions: &'a AxisConditions,
         sensor_force_n: f64,
     ) -> DeclaredAt<'a> {
         let command = self.memory.commands[axis].newest();
         let time_s = self.memory.substeps as f64 * self.substep_s;
-        DeclaredAt { seen, command, time_s, sensor_force_n, kept: &self.memory.declared[axis] }
+        DeclaredAt { conditions, command, time_s, sensor_force_n, kept: &self.memory.declared[axis] }
     }
 }

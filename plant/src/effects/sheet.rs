@@ -5,8 +5,8 @@
 
 use std::fmt;
 
-use super::friction::Rubbing;
-use super::tabulated::Seen;
+use super::friction::FrictionConditions;
+use super::tabulated::AxisConditions;
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -42,7 +42,7 @@ pub struct Sheet {
     /// The error of a sensor that the first number is; the sensor, where the place names none.
     pub sensor_error: Option<(SensorError, Option<Element>)>,
     /// Measurements by hand that discriminate it from its twins.
-    pub told_apart_by: &'static [ByHand],
+    pub distinguished_by: &'static [ManualMeasurement],
 }
 
 impl Sheet {
@@ -62,7 +62,7 @@ impl Sheet {
         has_memory: false,
         excited_by: Excitation::Any,
         sensor_error: None,
-        told_apart_by: &[],
+        distinguished_by: &[],
     };
 
     /// The place of this kind that a rig file calls so, as `drive` or `drive.a`.
@@ -176,9 +176,9 @@ pub enum SensorError {
     Offset,
 }
 
-/// Measurements by hand, for effects that no experiment discriminates.
+/// Manual measurements, for effects that no experiment discriminates.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum ByHand {
+pub enum ManualMeasurement {
     /// Both chambers at the atmosphere, a gauge at the supply.
     Venting,
     /// A known angle of the rig.
@@ -322,7 +322,7 @@ impl fmt::Display for Place {
 
 /// An effect switched on at one place, with its numbers in the file's units, in the order of its sheet's keys.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Switched {
+pub struct ActiveEffect {
     /// Name of the effect.
     pub name: &'static str,
     /// Where it is.
@@ -354,14 +354,14 @@ pub(crate) enum OpenBalance<'a> {
     /// Opening of the edges, by the spool's position; laws: [`Law::Air`].
     Opening { spool: f64 },
     /// Normal flow into a chamber beside the valve's, m^3/s; laws: [`Law::StoredAir`].
-    Leakage { chamber: usize, seen: &'a Seen },
+    Leakage { chamber: usize, conditions: &'a AxisConditions },
     /// Sliding level at a speed, N; direction 1 extending, -1 retracting; laws: [`Law::Friction`]. A term over the speed is of
     /// second order in the step only where `Friction::middle_speed` knows its effect.
-    SlidingLevel { at: &'a Rubbing, speed_m_per_s: f64, direction: f64 },
+    SlidingLevel { at: &'a FrictionConditions, speed_m_per_s: f64, direction: f64 },
     /// Break-away level, N; laws: [`Law::Friction`].
-    BreakAwayLevel { at: &'a Rubbing, direction: f64 },
+    BreakAwayLevel { at: &'a FrictionConditions, direction: f64 },
     /// Force on the piston along its extension, N; laws: [`Law::Force`].
-    Force(&'a Seen),
+    Force(&'a AxisConditions),
     /// Reading of the position by its truth, m; laws: none.
     PositionReading { truth_m: f64 },
     /// Reading of the force by its truth, N; laws: none.

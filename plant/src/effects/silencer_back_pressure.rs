@@ -17,7 +17,7 @@
 //! 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::node::Node;
-use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
@@ -37,7 +37,7 @@ impl Effect for SilencerBackPressure {
         nonlinear_in_amplitude: true,
         has_memory: true,
         excited_by: Excitation::Fast,
-        told_apart_by: &[ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::ConstantVolume],
         keys: &[
             EffectKey {
                 name: "silencer_kv_ratio",

@@ -14,7 +14,7 @@
 //!
 //! Source: slew rate of saturated actuators, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -33,7 +33,7 @@ impl Effect for SpoolRateLimit {
         source: "saturated actuators, Merritt 1967 ch. 7; range: textbook prior",
         nonlinear_in_amplitude: true,
         has_memory: true,
-        told_apart_by: &[ByHand::SpoolSignal],
+        distinguished_by: &[ManualMeasurement::SpoolSignal],
         keys: &[EffectKey {
             name: "rate_per_s",
             unit: Unit::PerSecond,

@@ -20,7 +20,7 @@
 //! Source: Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, valves with position-controlled spool; range:
 //! textbook prior around the 100 Hz of the rig's valve.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -39,7 +39,7 @@ impl Effect for SpoolSecondOrder {
         law: "the spool is a second-order system in place of the first-order lag",
         source: "Beater 2007, position-controlled spools; range: textbook prior",
         has_memory: true,
-        told_apart_by: &[ByHand::SpoolSignal],
+        distinguished_by: &[ManualMeasurement::SpoolSignal],
         keys: &[
             EffectKey {
                 name: "natural_frequency_hz",

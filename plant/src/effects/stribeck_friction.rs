@@ -16,7 +16,7 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit, "A survey of models, analysis tools and compensation methods for the
 //! control of machines with friction", Automatica 30(7), 1994, with d = 1 and 2 in use; range of v_s: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Excitation, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -38,7 +38,7 @@ impl Effect for StribeckFriction {
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); range: effects.md, textbook prior",
         nonlinear_in_amplitude: true,
         excited_by: Excitation::Creeping,
-        told_apart_by: &[ByHand::Pulling],
+        distinguished_by: &[ManualMeasurement::Pulling],
         keys: &[
             EffectKey {
                 name: "velocity_mm_per_s",

@@ -20,7 +20,7 @@
 
 use super::line_resistance::full_flow_m3_per_s;
 use super::node::Node;
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -39,7 +39,7 @@ impl Effect for SupplyDroop {
         law: "the supply node is a volume fed through a regulator that gives way under flow",
         source: "ISO 6953-2:2015, Beater 2007; range: textbook prior",
         has_memory: true,
-        told_apart_by: &[ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::ConstantVolume],
         keys: &[
             EffectKey {
                 name: "droop_bar",

@@ -149,7 +149,7 @@ impl Variable {
     /// What it is at an instant of an axis, in SI.
     #[must_use]
     pub fn value(self, state: &AxisState, truth: &AxisTruth) -> f64 {
-        self.of(&Seen {
+        self.of(&AxisConditions {
             extension_m: state.extension_m,
             velocity_m_per_s: state.rod_velocity_m_per_s,
             spool: state.spool,
@@ -157,7 +157,7 @@ impl Variable {
         })
     }
 
-    fn of(self, at: &Seen) -> f64 {
+    fn of(self, at: &AxisConditions) -> f64 {
         let [a, b] = at.pressure_pa;
         match self {
             Variable::Extension => at.extension_m,
@@ -215,20 +215,20 @@ impl Tabulated {
     }
 }
 
-/// What tables are over, at an instant.
+/// Values of an axis at an instant that tables, terms and forces depend on.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Seen {
+pub(crate) struct AxisConditions {
     pub(crate) extension_m: f64,
     pub(crate) velocity_m_per_s: f64,
     pub(crate) spool: f64,
     pub(crate) pressure_pa: [f64; 2],
 }
 
-impl Seen {
+impl AxisConditions {
     /// At the instant of a state.
     pub(crate) fn at(lanes: &Lanes, air: &AirAt, axis: usize) -> Self {
         let place = lanes.place(axis);
-        Seen {
+        AxisConditions {
             extension_m: place.extension,
             velocity_m_per_s: place.velocity,
             spool: lanes.spool.to_array()[axis],
@@ -247,8 +247,8 @@ struct Law {
 }
 
 impl Law {
-    fn value(&self, seen: &Seen) -> f64 {
-        interpolated(&self.at, &self.value, self.variable.of(seen))
+    fn value(&self, conditions: &AxisConditions) -> f64 {
+        interpolated(&self.at, &self.value, self.variable.of(conditions))
     }
 }
 
@@ -301,19 +301,19 @@ impl Tables {
     }
 
     /// Force along the axis's extension, N.
-    pub(crate) fn force(&self, seen: &Seen) -> f64 {
-        self.sum(Balance::Force, seen)
+    pub(crate) fn force(&self, conditions: &AxisConditions) -> f64 {
+        self.sum(Balance::Force, conditions)
     }
 
     /// Flow into a chamber, m^3/s.
-    pub(crate) fn flow(&self, chamber: usize, seen: &Seen) -> f64 {
-        let flow = self.sum([Balance::FlowA, Balance::FlowB][chamber], seen);
-        let pressure_pa = seen.pressure_pa[chamber];
+    pub(crate) fn flow(&self, chamber: usize, conditions: &AxisConditions) -> f64 {
+        let flow = self.sum([Balance::FlowA, Balance::FlowB][chamber], conditions);
+        let pressure_pa = conditions.pressure_pa[chamber];
         neither_empties_nor_bursts(flow, pressure_pa, [self.exhaust_pa, self.supply_pa])
     }
 
-    fn sum(&self, balance: Balance, seen: &Seen) -> f64 {
-        self.laws.iter().filter(|law| law.balance == balance).map(|law| law.value(seen)).sum()
+    fn sum(&self, balance: Balance, conditions: &AxisConditions) -> f64 {
+        self.laws.iter().filter(|law| law.balance == balance).map(|law| law.value(conditions)).sum()
     }
 }
 
@@ -333,8 +333,8 @@ pub(super) fn neither_empties_nor_bursts(flow: f64, pressure_pa: f64, ends_pa: [
 mod tests {
     use super::*;
 
-    fn seen(extension_m: f64, velocity_m_per_s: f64) -> Seen {
-        Seen { extension_m, velocity_m_per_s, spool: 0.25, pressure_pa: [4e5, 3e5] }
+    fn conditions(extension_m: f64, velocity_m_per_s: f64) -> AxisConditions {
+        AxisConditions { extension_m, velocity_m_per_s, spool: 0.25, pressure_pa: [4e5, 3e5] }
     }
 
     fn tables(tables: &[Tabulated]) -> Tables {
@@ -352,7 +352,7 @@ mod tests {
         for (x, force) in
             [(-1.0, 2.0), (0.0, 2.0), (0.05, 3.0), (0.1, 4.0), (0.25, -2.0), (0.4, -8.0), (9.0, -8.0)]
         {
-            assert!((tables.force(&seen(x, 0.0)) - force).abs() < 1e-12, "{x}");
+            assert!((tables.force(&conditions(x, 0.0)) - force).abs() < 1e-12, "{x}");
         }
     }
 
@@ -360,10 +360,10 @@ mod tests {
     fn each_variable_is_what_its_name_says() {
         let expected = [0.2, -0.5, 0.5, -1.0, 0.25, 4e5, 3e5, 1e5, -0.2];
         for (variable, expected) in Variable::ALL.into_iter().zip(expected) {
-            assert_eq!(variable.of(&seen(0.2, -0.5)), expected, "{}", variable.name());
+            assert_eq!(variable.of(&conditions(0.2, -0.5)), expected, "{}", variable.name());
         }
-        assert_eq!(Variable::Direction.of(&seen(0.2, 0.0)), 0.0);
-        assert_eq!(Variable::DirectedExtension.of(&seen(0.2, 0.0)), 0.0);
+        assert_eq!(Variable::Direction.of(&conditions(0.2, 0.0)), 0.0);
+        assert_eq!(Variable::DirectedExtension.of(&conditions(0.2, 0.0)), 0.0);
     }
 
     #[test]
@@ -372,12 +372,12 @@ mod tests {
         let two = table(Balance::Force, Variable::PressureDifference, &[0.0, 2e5], &[0.0, 10.0]);
         let both = tables(&[one.clone(), two.clone()]);
         for velocity in [-0.7, 0.0, 0.3] {
-            let at = seen(0.1, velocity);
+            let at = conditions(0.1, velocity);
             let sum =
                 tables(std::slice::from_ref(&one)).force(&at) + tables(std::slice::from_ref(&two)).force(&at);
             assert!((both.force(&at) - sum).abs() < 1e-12);
         }
-        assert!(!both.adds_air() && both.flow(0, &seen(0.1, 0.0)) == 0.0);
+        assert!(!both.adds_air() && both.flow(0, &conditions(0.1, 0.0)) == 0.0);
     }
 
     #[test]
@@ -387,7 +387,7 @@ mod tests {
             table(Balance::FlowB, Variable::Extension, &[0.0, 1.0], &[6.0, 6.0]),
         ]);
         let flow = |chamber: usize, pressure_pa: f64| {
-            flows.flow(chamber, &Seen { pressure_pa: [pressure_pa; 2], ..seen(0.1, 0.0) })
+            flows.flow(chamber, &AxisConditions { pressure_pa: [pressure_pa; 2], ..conditions(0.1, 0.0) })
         };
         assert!((flow(0, 4e5) + 1e-4).abs() < 1e-15 && (flow(1, 4e5) - 1e-4).abs() < 1e-15);
         assert_eq!(flow(0, 0.0), 0.0);

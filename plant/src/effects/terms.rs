@@ -11,7 +11,7 @@ use super::replaced::linkage_terms;
 use super::sheet::{Element, Part};
 use super::sums::Balance;
 use super::sums::{Damping, DeadSpace, ExhaustSide, Gap, Stiffness};
-use super::tabulated::Seen;
+use super::tabulated::AxisConditions;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
 use crate::state::{Inputs, State};
@@ -74,20 +74,20 @@ impl Term {
 const CHAMBERS: [(&str, Element); 2] = [("a", Element::A), ("b", Element::B)];
 
 /// The walk over all terms, which calls a function for each.
-struct Teller<'t> {
+struct TermVisitor<'t> {
     effects: &'t Effects,
     part: Part,
-    tell: &'t mut dyn FnMut(Term),
+    visit: &'t mut dyn FnMut(Term),
 }
 
-impl Teller<'_> {
-    /// Tells the terms of a balance whose effects are on.
+impl TermVisitor<'_> {
+    /// Visits the terms of a balance whose effects are on.
     fn balance<B: Balance>(&mut self, balance: &B, name: Option<&'static str>, element: Option<Element>) {
         let on = &self.effects.on[usize::from(self.part == Part::Load)];
         balance.each(&mut |effect, value| {
             if on.is_on(effect, element) {
                 let (part, element) = (self.part, name);
-                (self.tell)(Term { part, element, balance: B::NAME, effect, unit: B::UNIT, value });
+                (self.visit)(Term { part, element, balance: B::NAME, effect, unit: B::UNIT, value });
             }
         });
     }
@@ -97,26 +97,26 @@ impl Teller<'_> {
         self.balance(balance, name, open.element());
         let (part, element) = (self.part, name);
         self.effects.on[usize::from(part == Part::Load)].each_term(open, |effect, value| {
-            (self.tell)(Term { part, element, balance: B::NAME, effect, unit: B::UNIT, value });
+            (self.visit)(Term { part, element, balance: B::NAME, effect, unit: B::UNIT, value });
         });
     }
 }
 
 impl Effects {
-    /// Tells every term of the rig at an instant.
+    /// Visits every term of the rig at an instant.
     pub(crate) fn each_term(
         &self,
         of: &Integrator,
         state: &State,
         inputs: &Inputs,
-        tell: &mut dyn FnMut(Term),
+        visit: &mut dyn FnMut(Term),
     ) {
         let lanes = Lanes::load(state);
         let air = AirAt::of(of, &lanes);
         let forces = TrueForces::at(of, Some(self), &lanes, hand_forces(inputs), state.linked);
         for (axis, part) in [Part::Drive, Part::Load].into_iter().enumerate() {
-            let mut teller = Teller { effects: self, part, tell };
-            let axis_states = &self.memory.moving.axes[axis];
+            let mut visitor = TermVisitor { effects: self, part, visit };
+            let axis_states = &self.memory.states.axes[axis];
             let lane = |pair: Pair| pair.to_array()[axis];
             let place = lanes.place(axis);
 
@@ -126,32 +126,36 @@ impl Effects {
             let target = self.target(axis, axis_states, arriving.sum(command));
             let sent = target.sum(arriving.sum(command)).clamp(-1.0, 1.0);
             let (rate, limited) = self.spool_rate(axis, axis_states, state.axes[axis].spool, sent);
-            teller.balance(&arriving, None, None);
-            teller.balance(&target, None, None);
-            teller.balance(&rate, None, None);
-            teller.balance(&limited, None, None);
+            visitor.balance(&arriving, None, None);
+            visitor.balance(&target, None, None);
+            visitor.balance(&rate, None, None);
+            visitor.balance(&limited, None, None);
             let ports = self.ports_at(of, axis, state, &air);
             let open = OpenBalance::Opening { spool: state.axes[axis].spool };
-            teller.open(&ports.opening, None, &open);
+            visitor.open(&ports.opening, None, &open);
             for (edge, name) in ["supply", "exhaust"].into_iter().enumerate() {
-                teller.balance(&ports.characteristic[edge], Some(name), None);
+                visitor.balance(&ports.characteristic[edge], Some(name), None);
             }
-            teller.balance(&ExhaustSide { silencer_back_pressure: axis_states.silencer_pa }, None, None);
+            visitor.balance(&ExhaustSide { silencer_back_pressure: axis_states.silencer_pa }, None, None);
 
             // The chambers.
-            let seen = Seen::at(&lanes, &air, axis);
-            let leakage = self.leakage(of, axis, &seen);
+            let conditions = AxisConditions::at(&lanes, &air, axis);
+            let leakage = self.leakage(of, axis, &conditions);
             let flows = lanes.air().map(|air| lane(air.flow));
             for (chamber, (name, element)) in CHAMBERS.into_iter().enumerate() {
                 let (at, element) = (Some(name), Some(element));
                 let edges = [["supply_a", "exhaust_a"], ["supply_b", "exhaust_b"]];
                 for (edge, name) in ports.edges[chamber].iter().zip(edges[chamber]) {
-                    teller.balance(edge, Some(name), element);
+                    visitor.balance(edge, Some(name), element);
                 }
-                teller.balance(&ports.port[chamber], at, element);
-                teller.balance(&ports.port_flow[chamber], at, element);
-                teller.balance(&self.line(axis, chamber, ports.flow_m3_per_s[chamber], 0.0), at, element);
-                teller.open(&leakage[chamber], at, &OpenBalance::Leakage { chamber, seen: &seen });
+                visitor.balance(&ports.port[chamber], at, element);
+                visitor.balance(&ports.port_flow[chamber], at, element);
+                visitor.balance(&self.line(axis, chamber, ports.flow_m3_per_s[chamber], 0.0), at, element);
+                visitor.open(
+                    &leakage[chamber],
+                    at,
+                    &OpenBalance::Leakage { chamber, conditions: &conditions },
+                );
                 let heat = HeatAt {
                     stored_j: lane(lanes.air()[chamber].stored),
                     volume_m3: lane(air.volume[chamber]),
@@ -163,48 +167,48 @@ impl Effects {
                 let area_m2 = [1.0, -1.0][chamber] * of.chambers.areas_m2()[chamber];
                 rate.heat_exchange -=
                     self.work_share(axis) * air.of_axis_pa(axis)[chamber] * area_m2 * place.velocity;
-                teller.balance(&rate, at, element);
+                visitor.balance(&rate, at, element);
                 let file = of.file_dead_volume_m3;
                 let dead_volume = self.on[axis].dead_volume.map_or(0.0, |effect| effect.term(file));
-                teller.balance(&DeadSpace { dead_volume }, at, element);
+                visitor.balance(&DeadSpace { dead_volume }, at, element);
             }
 
             // Friction in the direction of the motion, or of the force on a resting piston.
             let friction = Friction::at(self, of, axis, place, &air);
             let force = forces.unresisted_n(axis);
             let direction = direction_of(if place.velocity == 0.0 { force } else { place.velocity });
-            let (at, speed) = (&friction.rubbing, place.velocity.abs());
+            let (at, speed) = (&friction.conditions, place.velocity.abs());
             let sliding = friction.sliding_level(speed, direction);
             let open = OpenBalance::SlidingLevel { at, speed_m_per_s: speed, direction };
-            teller.open(&sliding, None, &open);
+            visitor.open(&sliding, None, &open);
             let open = OpenBalance::BreakAwayLevel { at, direction };
-            teller.open(&friction.break_away_level(direction, &sliding), None, &open);
-            teller.balance(&self.viscous_term(of, axis, direction), None, None);
+            visitor.open(&friction.break_away_level(direction, &sliding), None, &open);
+            visitor.balance(&self.viscous_term(of, axis, direction), None, None);
             let bristles = friction.bristles(place, force).unwrap_or_default();
-            teller.balance(&bristles, None, None);
-            teller.open(&self.force(axis, &seen), None, &OpenBalance::Force(&seen));
+            visitor.balance(&bristles, None, None);
+            visitor.open(&self.force(axis, &conditions), None, &OpenBalance::Force(&conditions));
 
             // What the sensors make of it.
             let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m - place.extension };
             let force_n = forces.sensor_n(of, axis);
-            let declared = self.declared_at(axis, &seen, force_n);
+            let declared = self.declared_at(axis, &conditions, force_n);
             let open = OpenBalance::PositionReading { truth_m: position_m };
-            teller.open(&self.position_reading(axis, position_m, &declared), Some("position"), &open);
+            visitor.open(&self.position_reading(axis, position_m, &declared), Some("position"), &open);
             let open = OpenBalance::ForceReading { truth_n: force_n };
-            teller.open(&self.force_reading(axis, force_n, &declared), Some("force"), &open);
+            visitor.open(&self.force_reading(axis, force_n, &declared), Some("force"), &open);
             for (chamber, (name, _)) in CHAMBERS.into_iter().enumerate() {
                 let truth_pa = air.of_axis_pa(axis)[chamber];
                 let open = OpenBalance::PressureReading { chamber, truth_pa };
                 let reading = self.pressure_reading(axis, chamber, truth_pa, &declared);
-                teller.open(&reading, Some(name), &open);
+                visitor.open(&reading, Some(name), &open);
             }
         }
         let (gap, stiffness, damping) = linkage_terms(&self.on[0], &self.file_linkage);
-        let mut teller = Teller { effects: self, part: Part::Linkage, tell };
-        teller.balance::<Gap>(&gap, None, None);
-        teller.balance::<Stiffness>(&stiffness, None, None);
-        teller.balance::<Damping>(&damping, None, None);
-        let mut teller = Teller { effects: self, part: Part::Supply, tell };
-        teller.balance(&self.supply_side(&self.memory.moving), None, None);
+        let mut visitor = TermVisitor { effects: self, part: Part::Linkage, visit };
+        visitor.balance::<Gap>(&gap, None, None);
+        visitor.balance::<Stiffness>(&stiffness, None, None);
+        visitor.balance::<Damping>(&damping, None, None);
+        let mut visitor = TermVisitor { effects: self, part: Part::Supply, visit };
+        visitor.balance(&self.supply_side(&self.memory.states), None, None);
     }
 }

@@ -15,7 +15,7 @@
 //!
 //! Source: definition; range: effects.md, textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, PlaceKind, SensorError, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, SensorError, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -34,7 +34,11 @@ impl Effect for TimeSkew {
         source: "definition; range: effects.md, textbook prior",
         has_memory: true,
         sensor_error: Some((SensorError::Delay, None)),
-        told_apart_by: &[ByHand::PositionSensor, ByHand::PortPressure, ByHand::Uncoupling],
+        distinguished_by: &[
+            ManualMeasurement::PositionSensor,
+            ManualMeasurement::PortPressure,
+            ManualMeasurement::Uncoupling,
+        ],
         keys: &[EffectKey {
             name: "delay_ms",
             unit: Unit::Millisecond,

@@ -19,7 +19,7 @@
 //! Source: flow gain of a spool with shaped or round ports, Merritt, Hydraulic Control Systems, 1967, chapter 5; bend and
 //! ratio are this catalogue's own shape; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -38,7 +38,7 @@ impl Effect for ValveCharacteristic {
         laws: &[Law::Air],
         law: "the K_V tables are bent over the opening, or supply and exhaust edges stand in another ratio",
         source: "spool port shapes, Merritt 1967 ch. 5; range: textbook prior",
-        told_apart_by: &[ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::ConstantVolume],
         keys: &[
             EffectKey {
                 name: "bend_percent",

@@ -15,7 +15,7 @@
 //! Source: lapped spool, Merritt, Hydraulic Control Systems, 1967, chapter 5; Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -33,7 +33,7 @@ impl Effect for ValveDeadZone {
         law: "the spool overlaps its edges: nothing opens below d, and the rest of the way is stretched",
         source: "lapped spool, Merritt 1967 ch. 5; range: textbook prior (Beater 2007)",
         nonlinear_in_amplitude: true,
-        told_apart_by: &[ByHand::ConstantVolume],
+        distinguished_by: &[ManualMeasurement::ConstantVolume],
         keys: &[EffectKey {
             name: "dead_zone_percent",
             unit: Unit::Percent,

@@ -14,7 +14,7 @@
 //!
 //! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -33,7 +33,7 @@ impl Effect for ValveHysteresis {
         source: "play operator, Krasnosel'skii and Pokrovskii 1989; range: textbook prior",
         nonlinear_in_amplitude: true,
         has_memory: true,
-        told_apart_by: &[ByHand::SpoolSignal],
+        distinguished_by: &[ManualMeasurement::SpoolSignal],
         keys: &[EffectKey {
             name: "half_width_percent",
             unit: Unit::Percent,

@@ -15,7 +15,7 @@
 //! Source: centre leakage of a spool with clearance, Merritt, Hydraulic Control Systems, 1967, chapter 5; range: textbook
 //! prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -32,7 +32,7 @@ impl Effect for ValveNullLeakage {
         laws: &[Law::Air],
         law: "every edge keeps a floor of its largest K_V",
         source: "spool clearance, Merritt 1967 ch. 5; range: textbook prior",
-        told_apart_by: &[ByHand::LockedHold],
+        distinguished_by: &[ManualMeasurement::LockedHold],
         keys: &[EffectKey {
             name: "leakage_percent",
             unit: Unit::Percent,

@@ -12,7 +12,7 @@
 //!
 //! Source: null bias, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{ByHand, Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -29,7 +29,7 @@ impl Effect for ValveOffset {
         laws: &[Law::Spool],
         law: "the spool's null lies beside the command's",
         source: "null bias, Merritt 1967 ch. 7; range: textbook prior",
-        told_apart_by: &[ByHand::LockedHold],
+        distinguished_by: &[ManualMeasurement::LockedHold],
         keys: &[EffectKey {
             name: "offset_percent",
             unit: Unit::Percent,

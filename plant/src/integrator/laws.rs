@@ -4,26 +4,26 @@
 //! by the baseline's own formula, so a rig without effects pays nothing for their being possible; a hash of bits and a count
 //! of instructions hold that down. `effects/acting.rs` is the other answer.
 
-use super::{Held, Integrator, Lanes, Middle, Node, Span};
+use super::{HeldInputs, Integrator, Lanes, Middle, Node, Span};
 use crate::chamber::Air;
 use crate::lanes::{Axes, Pair};
 use crate::motion::{MotionSpan, Place, against};
 use crate::valve::edge_flow;
 
-/// A step to be made: whose, how long, from where, and what is held over it.
+/// All that a step depends on: integrator, length, start state, supply and held inputs.
 #[derive(Clone, Copy)]
-pub(crate) struct At<'s, P = Pair> {
+pub(crate) struct StepContext<'s, P = Pair> {
     pub(crate) of: &'s Integrator<P>,
     pub(crate) span: &'s Span<P>,
     pub(crate) from: &'s Lanes<P>,
     pub(crate) node: Node,
-    pub(crate) held: Held<P>,
-    /// Which substep of the period, and which part of it; 0 for a substep that is made in one.
+    pub(crate) held: HeldInputs<P>,
+    /// Index of the substep in the period, and of the part in the substep; 0 for a substep that is made in one.
     pub(crate) substep: u32,
     pub(crate) part: u32,
 }
 
-impl At<'_> {
+impl StepContext<'_> {
     /// Time from the substep's beginning to the step's, s.
     pub(crate) fn since_substep_s(&self) -> f64 {
         let [_, fine] = self.of.spans();
@@ -36,7 +36,7 @@ impl At<'_> {
     }
 }
 
-impl<P: Axes> At<'_, P> {
+impl<P: Axes> StepContext<'_, P> {
     /// The spools when this share of what they lack is left.
     #[inline(always)]
     pub(crate) fn spool_after(&self, share: P) -> P {
@@ -46,7 +46,7 @@ impl<P: Axes> At<'_, P> {
     /// The baseline's air and flows at the midpoint, with the spools there.
     #[inline(always)]
     pub(crate) fn middle(&self, spool: P) -> Middle<P> {
-        let At { of, span, from, node, .. } = *self;
+        let StepContext { of, span, from, node, .. } = *self;
         let mut edges = of.valve.edges(spool, node.middle_pa, of.chambers.exhaust_pa());
         if node.shut {
             (edges.conductance_a, edges.conductance_b) = (P::both(0.0), P::both(0.0));
@@ -71,20 +71,20 @@ impl<P: Axes> At<'_, P> {
 
 /// The laws of a rig; pairs hold a value for each axis, forces are along its own extension.
 pub(crate) trait Laws<P: Axes = Pair> {
-    /// What a step hands on beside the lanes; a step that is discarded leaves none.
-    type Carried: Copy;
+    /// State that effects add to the lanes; a step that is discarded leaves none.
+    type ExtraState: Copy;
 
-    /// What the last step handed on.
-    fn carried(&self) -> Self::Carried;
+    /// That state at the end of the last step.
+    fn extra_state(&self) -> Self::ExtraState;
 
     /// Air and flows at the midpoint of a step.
-    fn middle(&self, at: At<'_, P>, carried: &mut Self::Carried) -> Middle<P>;
+    fn middle(&self, step: StepContext<'_, P>, extra_state: &mut Self::ExtraState) -> Middle<P>;
 
     /// Forces from outside on each piston, N: the hand's and what else there is.
-    fn outside(&self, at: At<'_, P>, middle: &Middle<P>) -> P;
+    fn outside(&self, step: StepContext<'_, P>, middle: &Middle<P>) -> P;
 
     /// Which axes move, for the laws of friction.
-    fn moving(&self, at: At<'_, P>) -> P::Mask;
+    fn moving(&self, step: StepContext<'_, P>) -> P::Mask;
 
     /// Which axes rest and slide on bristles: they neither stick nor break away.
     fn on_bristles(&self) -> [bool; 2];
@@ -92,67 +92,79 @@ pub(crate) trait Laws<P: Axes = Pair> {
     /// Friction on moving axes but for the viscous one, N, signed; `push` is the force without it.
     fn sliding(
         &self,
-        at: At<'_, P>,
+        step: StepContext<'_, P>,
         middle: &Middle<P>,
-        carried: &Self::Carried,
+        extra_state: &Self::ExtraState,
         push: P,
         moving: P::Mask,
     ) -> P;
 
     /// Friction on axes that this force sets in motion, N, signed.
-    fn starting(&self, at: At<'_, P>, middle: &Middle<P>, force: P, starts: P::Mask) -> P;
+    fn starting(&self, step: StepContext<'_, P>, middle: &Middle<P>, force: P, starts: P::Mask) -> P;
 
     /// Break-away force in the direction of a force, N.
-    fn break_away(&self, at: At<'_, P>, middle: &Middle<P>, force: P) -> P;
+    fn break_away(&self, step: StepContext<'_, P>, middle: &Middle<P>, force: P) -> P;
 
     /// Factors of the motion to the middle and to the end of a step.
-    fn ways<'s>(&'s self, at: At<'s, P>) -> [&'s MotionSpan<P>; 2];
+    fn ways<'s>(&'s self, step: StepContext<'s, P>) -> [&'s MotionSpan<P>; 2];
 
     /// Whether a resting axis stays under this force, N without any friction.
-    fn holds(&self, at: At<'_, P>, middle: &Middle<P>, axis: usize, force: f64) -> bool;
+    fn holds(&self, step: StepContext<'_, P>, middle: &Middle<P>, axis: usize, force: f64) -> bool;
 
     /// Moves one axis through a step under a held force, N without any friction.
     fn advance(
         &self,
-        at: At<'_, P>,
+        step: StepContext<'_, P>,
         middle: &Middle<P>,
-        carried: &mut Self::Carried,
+        extra_state: &mut Self::ExtraState,
         axis: usize,
         force: f64,
     ) -> Place;
 
     /// The air of both chambers after a step, given what lag and bounds left of it.
-    fn air(&self, at: At<'_, P>, to: &mut Lanes<P>, middle: &Middle<P>, carried: &mut Self::Carried);
+    fn air(
+        &self,
+        step: StepContext<'_, P>,
+        to: &mut Lanes<P>,
+        middle: &Middle<P>,
+        extra_state: &mut Self::ExtraState,
+    );
 
     /// The spools at the step's end.
-    fn spool(&self, at: At<'_, P>, carried: &Self::Carried) -> P;
+    fn spool(&self, step: StepContext<'_, P>, extra_state: &Self::ExtraState) -> P;
 
-    /// A substep counts: what it handed on is kept.
-    fn keep(&mut self, of: &Integrator<P>, held: Held<P>, to: &Lanes<P>, carried: &Self::Carried);
+    /// Accepts a substep: its added state is kept.
+    fn keep(
+        &mut self,
+        of: &Integrator<P>,
+        held: HeldInputs<P>,
+        to: &Lanes<P>,
+        extra_state: &Self::ExtraState,
+    );
 }
 
 /// The laws of rig-model.md.
 pub(crate) struct Baseline;
 
 impl<P: Axes> Laws<P> for Baseline {
-    type Carried = ();
+    type ExtraState = ();
 
     #[inline(always)]
-    fn carried(&self) {}
+    fn extra_state(&self) {}
 
     #[inline(always)]
-    fn middle(&self, at: At<'_, P>, (): &mut ()) -> Middle<P> {
-        at.middle(at.spool_after(at.span.spool_to_middle))
+    fn middle(&self, step: StepContext<'_, P>, (): &mut ()) -> Middle<P> {
+        step.middle(step.spool_after(step.span.spool_to_middle))
     }
 
     #[inline(always)]
-    fn outside(&self, at: At<'_, P>, _: &Middle<P>) -> P {
-        at.held.hand
+    fn outside(&self, step: StepContext<'_, P>, _: &Middle<P>) -> P {
+        step.held.hand
     }
 
     #[inline(always)]
-    fn moving(&self, at: At<'_, P>) -> P::Mask {
-        at.from.velocity.differs(P::both(0.0))
+    fn moving(&self, step: StepContext<'_, P>) -> P::Mask {
+        step.from.velocity.differs(P::both(0.0))
     }
 
     #[inline(always)]
@@ -161,46 +173,53 @@ impl<P: Axes> Laws<P> for Baseline {
     }
 
     #[inline(always)]
-    fn sliding(&self, at: At<'_, P>, _: &Middle<P>, (): &(), _: P, moving: P::Mask) -> P {
-        against(at.from.velocity, P::both(at.of.motion.levels.sliding_n[0]), moving)
+    fn sliding(&self, step: StepContext<'_, P>, _: &Middle<P>, (): &(), _: P, moving: P::Mask) -> P {
+        against(step.from.velocity, P::both(step.of.motion.levels.sliding_n[0]), moving)
     }
 
     #[inline(always)]
-    fn starting(&self, at: At<'_, P>, _: &Middle<P>, force: P, starts: P::Mask) -> P {
-        against(force, P::both(at.of.motion.levels.sliding_n[0]), starts)
+    fn starting(&self, step: StepContext<'_, P>, _: &Middle<P>, force: P, starts: P::Mask) -> P {
+        against(force, P::both(step.of.motion.levels.sliding_n[0]), starts)
     }
 
     #[inline(always)]
-    fn break_away(&self, at: At<'_, P>, _: &Middle<P>, _: P) -> P {
-        P::both(at.of.motion.levels.break_away_n[0])
+    fn break_away(&self, step: StepContext<'_, P>, _: &Middle<P>, _: P) -> P {
+        P::both(step.of.motion.levels.break_away_n[0])
     }
 
     #[inline(always)]
-    fn ways<'s>(&'s self, at: At<'s, P>) -> [&'s MotionSpan<P>; 2] {
-        [&at.span.motion_to_middle, &at.span.motion_to_end]
+    fn ways<'s>(&'s self, step: StepContext<'s, P>) -> [&'s MotionSpan<P>; 2] {
+        [&step.span.motion_to_middle, &step.span.motion_to_end]
     }
 
     #[inline(always)]
-    fn holds(&self, at: At<'_, P>, _: &Middle<P>, axis: usize, force: f64) -> bool {
-        at.of.motion.holds(at.from.place(axis).extension, force, at.of.motion.levels.break_away_n[0])
+    fn holds(&self, step: StepContext<'_, P>, _: &Middle<P>, axis: usize, force: f64) -> bool {
+        step.of.motion.holds(step.from.place(axis).extension, force, step.of.motion.levels.break_away_n[0])
     }
 
     #[inline(always)]
-    fn advance(&self, at: At<'_, P>, _: &Middle<P>, (): &mut (), axis: usize, force: f64) -> Place {
-        let motion = &at.of.motion;
-        motion.advance(axis, at.from.place(axis), force, &motion.levels, at.span.span_s)
+    fn advance(
+        &self,
+        step: StepContext<'_, P>,
+        _: &Middle<P>,
+        (): &mut (),
+        axis: usize,
+        force: f64,
+    ) -> Place {
+        let motion = &step.of.motion;
+        motion.advance(axis, step.from.place(axis), force, &motion.levels, step.span.span_s)
     }
 
     #[inline(always)]
-    fn air(&self, _: At<'_, P>, _: &mut Lanes<P>, _: &Middle<P>, (): &mut ()) {}
+    fn air(&self, _: StepContext<'_, P>, _: &mut Lanes<P>, _: &Middle<P>, (): &mut ()) {}
 
     #[inline(always)]
-    fn spool(&self, at: At<'_, P>, (): &()) -> P {
-        at.spool_after(at.span.spool_to_end)
+    fn spool(&self, step: StepContext<'_, P>, (): &()) -> P {
+        step.spool_after(step.span.spool_to_end)
     }
 
     #[inline(always)]
-    fn keep(&mut self, _: &Integrator<P>, _: Held<P>, _: &Lanes<P>, (): &()) {}
+    fn keep(&mut self, _: &Integrator<P>, _: HeldInputs<P>, _: &Lanes<P>, (): &()) {}
 }
 
 /// Air of both chambers in one place, for laws that treat them alike.

@@ -2,11 +2,11 @@
 //!
 //! All that it does to an axis is arithmetic and choosing, so that a loop over rigs can be made wide ([`crate::Batch`]).
 
-use super::laws::{At, Laws};
-use super::{Forces, Held, Integrator, Lanes, Node, Span};
+use super::laws::{Laws, StepContext};
+use super::{Forces, HeldInputs, Integrator, Lanes, Node, Span};
 use crate::chamber::Air;
 use crate::lanes::{Axes, Choice};
-use crate::linkage::Approach;
+use crate::linkage::ContactKinematics;
 use crate::motion::{MotionSpan, Place};
 
 /// A resting axis linked to a moving one is looked at closely from this far below its break-away force on, N: more than
@@ -34,14 +34,14 @@ impl<P: Axes> Integrator<P> {
         &self,
         laws: &L,
         (from, supply_pa): (&Lanes<P>, f64),
-        held: Held<P>,
+        held: HeldInputs<P>,
         substep: u32,
-        carried: &mut L::Carried,
+        extra_state: &mut L::ExtraState,
     ) -> ((Lanes<P>, f64), bool) {
         let span = &self.coarse;
         let node = self.node(span, supply_pa, held.stopped);
-        let at = At { of: self, span, from, node, held, substep, part: 0 };
-        let (next, corner) = self.smooth(laws, at, carried);
+        let step = StepContext { of: self, span, from, node, held, substep, part: 0 };
+        let (next, corner) = self.smooth(laws, step, extra_state);
         let valves_move =
             self.supply.check_valves_shut(supply_pa) != self.supply.check_valves_shut(node.end_pa);
         ((next, node.end_pa), corner | valves_move)
@@ -49,25 +49,30 @@ impl<P: Axes> Integrator<P> {
 
     /// A step that assumes no corner; the flag says that there may be one, and then the step counts for nothing.
     #[inline(always)]
-    fn smooth<L: Laws<P>>(&self, laws: &L, at: At<'_, P>, carried: &mut L::Carried) -> (Lanes<P>, bool) {
-        let (span, node, held) = (at.span, at.node, at.held);
-        let from = at.from.with_check_valves(node.shut);
-        let at = At { from: &from, ..at };
+    fn smooth<L: Laws<P>>(
+        &self,
+        laws: &L,
+        step: StepContext<'_, P>,
+        extra_state: &mut L::ExtraState,
+    ) -> (Lanes<P>, bool) {
+        let (span, node, held) = (step.span, step.node, step.held);
+        let from = step.from.with_check_valves(node.shut);
+        let step = StepContext { from: &from, ..step };
         let zero = P::both(0.0);
-        let middle = laws.middle(at, carried);
+        let middle = laws.middle(step, extra_state);
 
-        let moving = laws.moving(at);
-        let hand = laws.outside(at, &middle);
+        let moving = laws.moving(step);
+        let hand = laws.outside(step, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
             hand,
-            sliding_friction: laws.sliding(at, &middle, carried, middle.pneumatic + hand, moving),
+            sliding_friction: laws.sliding(step, &middle, extra_state, middle.pneumatic + hand, moving),
             contact: zero,
         };
-        let [to_middle, way] = laws.ways(at);
+        let [to_middle, way] = laws.ways(step);
         if held.linked {
-            let approach = self.approach(span, to_middle, &from, moving, &forces);
-            forces.contact = P::both(self.linkage.midpoint_force(approach));
+            let kinematics = self.kinematics(span, to_middle, &from, moving, &forces);
+            forces.contact = P::both(self.linkage.midpoint_force(kinematics));
         }
         let force = forces.sum();
         let mut velocity = (way.keep * from.velocity + way.gain * force).where_true(moving);
@@ -76,16 +81,16 @@ impl<P: Axes> Integrator<P> {
         let mut sticks = None;
         if laws.on_bristles() != [false; 2] {
             let unresisted = forces.pneumatic + forces.hand + forces.contact;
-            let place = |axis: usize, carried: &mut L::Carried| {
+            let place = |axis: usize, extra_state: &mut L::ExtraState| {
                 if !laws.on_bristles()[axis] {
                     return Place {
                         extension: extension.to_array()[axis],
                         velocity: velocity.to_array()[axis],
                     };
                 }
-                laws.advance(at, &middle, carried, axis, unresisted.to_array()[axis])
+                laws.advance(step, &middle, extra_state, axis, unresisted.to_array()[axis])
             };
-            let (drive, load) = (place(0, carried), place(1, carried));
+            let (drive, load) = (place(0, extra_state), place(1, extra_state));
             extension = P::new(drive.extension, load.extension);
             velocity = P::new(drive.velocity, load.velocity);
             sticks = Some(P::Mask::new(laws.on_bristles().map(|on| !on)));
@@ -95,7 +100,7 @@ impl<P: Axes> Integrator<P> {
             self.chambers.force_growth(&span.lag, middle.per_volume, [from.air_a.flow, from.air_b.flow]);
         let nudged_n = if held.linked && moving.any() { BREAK_AWAY_MARGIN_N } else { 0.0 };
         let margin = growth.abs() + P::both(nudged_n);
-        let break_away = laws.break_away(at, &middle, force);
+        let break_away = laws.break_away(step, &middle, force);
         let leaves = !moving & self.motion.might_leave(from.extension, force, margin, break_away);
         let turns = moving & (velocity * from.velocity).at_most(zero);
         let turns = sticks.map_or(turns, |sticks| turns & sticks);
@@ -107,8 +112,8 @@ impl<P: Axes> Integrator<P> {
             |air: Air<P>, edge_flow: P, volume: P| limits.stop(air, span.lag.advance(air, edge_flow), volume);
         let (air_a, fills_a) = stop(from.air_a, middle.edge_flow[0], self.chambers.volume_a(extension));
         let (air_b, fills_b) = stop(from.air_b, middle.edge_flow[1], self.chambers.volume_b(extension));
-        let mut next = Lanes { extension, velocity, spool: laws.spool(at, carried), air_a, air_b };
-        laws.air(at, &mut next, &middle, carried);
+        let mut next = Lanes { extension, velocity, spool: laws.spool(step, extra_state), air_a, air_b };
+        laws.air(step, &mut next, &middle, extra_state);
         (next, (leaves | turns | overruns | fills_a | fills_b).any() | touches)
     }
 
@@ -121,16 +126,16 @@ impl<P: Axes> Integrator<P> {
     }
 
     #[inline(always)]
-    pub(super) fn approach(
+    pub(super) fn kinematics(
         &self,
         span: &Span<P>,
         to_middle: &MotionSpan<P>,
         from: &Lanes<P>,
         moving: P::Mask,
         forces: &Forces<P>,
-    ) -> Approach {
+    ) -> ContactKinematics {
         let free = (to_middle.keep * from.velocity + to_middle.gain * forces.sum()).where_true(moving);
-        Approach {
+        ContactKinematics {
             distance_m: self.distance(from.extension),
             free_speed_m_per_s: -free.sum(),
             mobility: to_middle.gain.where_true(moving).sum(),

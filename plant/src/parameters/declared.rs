@@ -32,7 +32,7 @@ use crate::effects::declared::{
     Declared, MOST_PARAMETERS, MOST_REMEMBERED, MOST_TERMS, Number, SENSOR_FORCE, Target, VARIABLES,
     dimension, variables,
 };
-use crate::effects::remembered::{Remembered, STEP};
+use crate::effects::remembered::{MemoryVariable, STEP};
 use crate::effects::sheet;
 use crate::effects::sheet::PlaceKind;
 use crate::state::Axis;
@@ -107,8 +107,8 @@ fn read_with(
     Ok(all)
 }
 
-/// What a term keeps, as it is written.
-struct KeptText {
+/// A memory variable, as it is written.
+struct MemoryText {
     name: String,
     unit: Unit,
     range: [f64; 2],
@@ -116,14 +116,14 @@ struct KeptText {
     update: Text,
 }
 
-impl KeptText {
+impl MemoryText {
     fn variable(&self) -> Variable<'_> {
         let range = self.range.map(|end| end * self.unit.factor);
         Variable { name: &self.name, dimension: self.unit.dimension, range }
     }
 
-    fn with(&self, (start_formula, update_formula): (Formula, Formula)) -> Remembered {
-        Remembered {
+    fn with(&self, (start_formula, update_formula): (Formula, Formula)) -> MemoryVariable {
+        MemoryVariable {
             name: self.name.clone(),
             unit: self.unit.clone(),
             range: self.range,
@@ -193,7 +193,7 @@ struct Reader<'a> {
 impl Reader<'_> {
     fn term(&mut self, mut section: Section<'_>) -> Result<Declared> {
         let used = match self.laws {
-            Some(laws) => used(&mut section, self.source, laws)?,
+            Some(laws) => bound_law(&mut section, self.source, laws)?,
             None => None,
         };
         let name = match &used {
@@ -242,7 +242,7 @@ impl Reader<'_> {
         let twins = section.texts("twins")?;
         section.finish()?;
 
-        let ways: Vec<Variable<'_>> = kept.iter().map(KeptText::variable).collect();
+        let ways: Vec<Variable<'_>> = kept.iter().map(MemoryText::variable).collect();
         let mut before = variables();
         if target.kind() != PlaceKind::Channel
             && numbers.iter().any(|number| number.name == before[SENSOR_FORCE].name)
@@ -354,7 +354,7 @@ impl Reader<'_> {
     }
 
     /// What the term keeps, its expressions as they are written.
-    fn kept(&self, name: String, mut section: Section<'_>) -> Result<KeptText> {
+    fn kept(&self, name: String, mut section: Section<'_>) -> Result<MemoryText> {
         let unit = self.unit(&mut section)?;
         let range = match section.numbers("range")?.as_slice() {
             [least, most] if least < most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],
@@ -367,7 +367,7 @@ impl Reader<'_> {
         let update =
             section.needed_text("update", "the expression that renews it at the end of a substep")?;
         section.finish()?;
-        Ok(KeptText { name, unit, range, start, update })
+        Ok(MemoryText { name, unit, range, start, update })
     }
 
     fn unit(&self, section: &mut Section<'_>) -> Result<Unit> {
@@ -426,7 +426,7 @@ impl Declared {
                 number.value
             );
         }
-        for Remembered { name, unit, range: [least, most], start, update, .. } in &self.memory {
+        for MemoryVariable { name, unit, range: [least, most], start, update, .. } in &self.memory {
             let (unit, start, update) = (text(&unit.text), text(start), text(update));
             let _ = writeln!(
                 out,

@@ -61,7 +61,7 @@ pub struct LawNumber {
 pub type Laws<'a> = &'a dyn Fn(&str) -> Result<Law, String>;
 
 /// A law with what a file binds to it.
-pub(super) struct Used {
+pub(super) struct BoundLaw {
     pub(super) name: String,
     pub(super) add: String,
     /// Byte of the file at which the law is named: what is wrong in its expression is reported there.
@@ -70,24 +70,28 @@ pub(super) struct Used {
 }
 
 /// Reads what stands beside `use` in a suspect; `None` where it has none.
-pub(super) fn used(section: &mut Section<'_>, source: &Source<'_>, laws: Laws<'_>) -> Result<Option<Used>> {
+pub(super) fn bound_law(
+    section: &mut Section<'_>,
+    source: &Source<'_>,
+    laws: Laws<'_>,
+) -> Result<Option<BoundLaw>> {
     let Some(used) = section.text("use")? else { return Ok(None) };
     let law = laws(&used.text).map_err(|why| source.wrong_from(used.at, &format!("use: {why}")))?;
     if let Some(key) = ["add", "memory"].into_iter().find(|key| section.has(key)) {
         return Err(section.wrong_at(key, &format!("{key}: the law of the library stands in its place")));
     }
     let name = section.text("name")?.map_or_else(|| law.name.clone(), |text| text.text);
-    let mut stands = variables(section, &law)?;
-    let numbers = numbers(section, source, (&law, &name), &mut stands)?;
-    let of = |part: &str| stands.iter().find(|(name, _)| name == part).map(|(_, text)| text.clone());
+    let mut bindings = variables(section, &law)?;
+    let numbers = numbers(section, source, (&law, &name), &mut bindings)?;
+    let of = |part: &str| bindings.iter().find(|(name, _)| name == part).map(|(_, text)| text.clone());
     let mut add = renamed(&law.add, &of);
     if let Some(times) = section.text("times")? {
         add = format!("({})*({add})", times.text);
     }
-    Ok(Some(Used { name, add, at: used.at, numbers }))
+    Ok(Some(BoundLaw { name, add, at: used.at, numbers }))
 }
 
-/// What stands for each variable of the law.
+/// The expression that each variable of the law is bound to.
 fn variables(section: &mut Section<'_>, law: &Law) -> Result<Vec<(String, String)>> {
     let mut with = section.section("with")?;
     let mut given = Vec::new();
@@ -98,16 +102,16 @@ fn variables(section: &mut Section<'_>, law: &Law) -> Result<Vec<(String, String
     if let Some(with) = with {
         with.finish()?;
     }
-    let stands = |variable: &LawVariable| {
-        stands_for(law, &given, &variable.name, law.variables.len())
+    let binding = |variable: &LawVariable| {
+        binding_of(law, &given, &variable.name, law.variables.len())
             .map(|text| (variable.name.clone(), text))
             .map_err(|why| section.wrong(&why))
     };
-    law.variables.iter().map(stands).collect()
+    law.variables.iter().map(binding).collect()
 }
 
-/// What stands for a variable: what the file binds to it, the rig's variable of its name, or its default.
-fn stands_for(law: &Law, given: &[(String, String)], name: &str, depth: usize) -> Result<String, String> {
+/// The expression of a variable: what the file binds to it, the rig's variable of its name, or its default.
+fn binding_of(law: &Law, given: &[(String, String)], name: &str, depth: usize) -> Result<String, String> {
     if let Some((_, text)) = given.iter().find(|(other, _)| other == name) {
         return Ok(text.clone());
     }
@@ -125,7 +129,7 @@ fn stands_for(law: &Law, given: &[(String, String)], name: &str, depth: usize) -
     let missing = std::cell::RefCell::new(None);
     let inner = |part: &str| {
         of(part)?;
-        stands_for(law, given, part, depth - 1).map_err(|why| missing.replace(Some(why))).ok()
+        binding_of(law, given, part, depth - 1).map_err(|why| missing.replace(Some(why))).ok()
     };
     let text = format!("({})", renamed(default, &inner));
     missing.into_inner().map_or(Ok(text), Err)
@@ -135,12 +139,12 @@ fn is_of_rig(name: &str) -> bool {
     VARIABLES.iter().any(|(variable, ..)| *variable == name)
 }
 
-/// The numbers of the law with what the file says of them; `stands` gets what they are called in the expression.
+/// The numbers of the law with what the file says of them; `bindings` gets what they are called in the expression.
 fn numbers(
     section: &mut Section<'_>,
     source: &Source<'_>,
     (law, suspect): (&Law, &str),
-    stands: &mut Vec<(String, String)>,
+    bindings: &mut Vec<(String, String)>,
 ) -> Result<Vec<Number>> {
     let mut given = section.section("parameters")?;
     let mut numbers = Vec::new();
@@ -159,14 +163,14 @@ fn numbers(
             let unit = if read.unit.text == "1" { String::new() } else { format!("[{}]", read.unit.text) };
             let constant = format!("{:?}{unit}", read.value.abs());
             let sign = if read.value < 0.0 { "-" } else { "" };
-            stands.push((number.name.clone(), format!("({sign}{constant})")));
+            bindings.push((number.name.clone(), format!("({sign}{constant})")));
             continue;
         }
         let name = match is_of_rig(&number.name) {
             true => format!("{}_{}", suspect.replace('-', "_"), number.name),
             false => number.name.clone(),
         };
-        stands.push((number.name.clone(), name.clone()));
+        bindings.push((number.name.clone(), name.clone()));
         numbers.push(Number { name, ..read });
     }
     given.map_or(Ok(()), |given| given.finish())?;

@@ -11,7 +11,7 @@ use settings::{Section, Source};
 use super::table::{KEYS, Key, Unit};
 use super::{declared, switched, tabulated};
 use crate::effects::declared::Declared;
-use crate::effects::sheet::Switched;
+use crate::effects::sheet::ActiveEffect;
 use crate::effects::tabulated::Tabulated;
 
 /// Why a rig file is refused: the place, the key, the value and what is allowed.
@@ -48,7 +48,7 @@ pub(super) struct Entry {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Entries {
     pub(super) file: String,
-    pub(super) effects: Vec<Switched>,
+    pub(super) effects: Vec<ActiveEffect>,
     pub(super) tabulated: Vec<Tabulated>,
     pub(super) terms: Vec<Declared>,
     entries: BTreeMap<(&'static str, &'static str), Entry>,

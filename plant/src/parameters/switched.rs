@@ -11,11 +11,11 @@
 
 use settings::{Result, Section};
 
-use crate::effects::sheet::{EffectKey, Place, Sheet, Switched};
+use crate::effects::sheet::{ActiveEffect, EffectKey, Place, Sheet};
 use crate::effects::{SHEETS, sheet};
 
 /// All effects that the file switches on, in the order of the catalogue and of its places.
-pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<Switched>> {
+pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<ActiveEffect>> {
     let mut effects = Vec::new();
     let mut table = root.section_or_empty("effects")?;
     for name in table.keys() {
@@ -59,10 +59,10 @@ pub(super) fn read(root: &mut Section<'_>) -> Result<Vec<Switched>> {
 }
 
 /// The effect with one number for each key of its sheet.
-fn switched(sheet: &Sheet, place: Place, section: &Section<'_>) -> Result<Switched> {
+fn switched(sheet: &Sheet, place: Place, section: &Section<'_>) -> Result<ActiveEffect> {
     section.allow(&sheet.keys.iter().map(|key| key.name).collect::<Vec<_>>())?;
     let numbers = sheet.keys.iter().map(|key| number(section, key)).collect::<Result<_>>()?;
-    Ok(Switched { name: sheet.name, place, numbers })
+    Ok(ActiveEffect { name: sheet.name, place, numbers })
 }
 
 fn number(section: &Section<'_>, key: &EffectKey) -> Result<f64> {
@@ -80,6 +80,6 @@ fn number(section: &Section<'_>, key: &EffectKey) -> Result<f64> {
 }
 
 /// Into the order of the catalogue, and of the places of an effect.
-pub(super) fn sort(effects: &mut [Switched]) {
+pub(super) fn sort(effects: &mut [ActiveEffect]) {
     effects.sort_by_key(|effect| (SHEETS.iter().position(|sheet| sheet.name == effect.name), effect.place));
 }

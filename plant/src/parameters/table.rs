@@ -160,35 +160,35 @@ impl fmt::Display for Key {
 /// Points of each valve table.
 pub const VALVE_POINTS: usize = 6;
 
-/// What a key of the rig file becomes: a number, a whole number, or the points of a valve table.
-trait Held {
+/// Type of a parameter: a number, a whole number, or the points of a valve table.
+trait ParameterValue {
     /// Numbers of the file.
     const COUNT: usize;
 
     /// From the numbers in SI, as many as these.
-    fn held(si: &[f64]) -> Self;
+    fn from_si(si: &[f64]) -> Self;
 }
 
-impl Held for f64 {
+impl ParameterValue for f64 {
     const COUNT: usize = 1;
 
-    fn held(si: &[f64]) -> Self {
+    fn from_si(si: &[f64]) -> Self {
         si[0]
     }
 }
 
-impl Held for u32 {
+impl ParameterValue for u32 {
     const COUNT: usize = 1;
 
-    fn held(si: &[f64]) -> Self {
+    fn from_si(si: &[f64]) -> Self {
         si[0] as u32
     }
 }
 
-impl<const N: usize> Held for [f64; N] {
+impl<const N: usize> ParameterValue for [f64; N] {
     const COUNT: usize = N;
 
-    fn held(si: &[f64]) -> Self {
+    fn from_si(si: &[f64]) -> Self {
         std::array::from_fn(|i| si[i])
     }
 }
@@ -206,7 +206,7 @@ macro_rules! rig_file {
             unit: Unit::$unit,
             min: $min,
             max: $max,
-            count: <$number as Held>::COUNT,
+            count: <$number as ParameterValue>::COUNT,
             meaning: $meaning,
             source: $source,
         },)*)*];
@@ -224,7 +224,7 @@ macro_rules! rig_file {
             /// `si` gives the numbers of a key, in SI.
             pub(super) fn of(si: impl Fn(&str, &str) -> Vec<f64>) -> Self {
                 Groups { $($table: $group {
-                    $($field: Held::held(&si(stringify!($table), stringify!($key))),)*
+                    $($field: ParameterValue::from_si(&si(stringify!($table), stringify!($key))),)*
                 },)* }
             }
         }

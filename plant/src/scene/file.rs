@@ -11,7 +11,7 @@ use settings::{Result, Section, Source};
 use super::hand::{
     DEFAULT_DAMPING_N_S_PER_M, DEFAULT_MOST_N, DEFAULT_RAMP_S, DEFAULT_STIFFNESS_N_PER_M, DEFAULT_TRAVEL_S,
 };
-use super::{Action, Arm, Event, Hand, Part, Scene, cycle_of};
+use super::{Action, Event, Hand, HandAction, Part, Scene, cycle_of};
 use crate::parameters::RigParameters;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -113,15 +113,15 @@ fn hand(mut table: Section<'_>, rig: &RigParameters) -> Result<Hand> {
     let from_s = table.needed_number(&FROM)?;
     let to_s = after(&mut table, &TO, &FROM, from_s)?;
     let guide_to = place("guide_to_m", rig);
-    let arm = match (table.number(&FORCE)?, table.number(&guide_to)?) {
+    let action = match (table.number(&FORCE)?, table.number(&guide_to)?) {
         (Some(force_n), None) => {
             let of_a_guide = ["travel_s", "stiffness_n_per_m", "damping_n_s_per_m", "most_n"];
             none_of(&table, &of_a_guide, "it belongs to a hand with guide_to_m, and this one has force_n")?;
-            Arm::Push { force_n, ramp_s: table.number_or_default(&RAMP)? }
+            HandAction::Push { force_n, ramp_s: table.number_or_default(&RAMP)? }
         }
         (None, Some(guide_to_m)) => {
             none_of(&table, &["ramp_s"], "it belongs to a hand with force_n, and this one has guide_to_m")?;
-            Arm::Guide {
+            HandAction::Guide {
                 guide_to_m,
                 travel_s: table.number(&TRAVEL)?.unwrap_or(TRAVEL.default.min(to_s - from_s)),
                 stiffness_n_per_m: table.number_or_default(&STIFFNESS)?,
@@ -135,7 +135,7 @@ fn hand(mut table: Section<'_>, rig: &RigParameters) -> Result<Hand> {
         }
     };
     table.finish()?;
-    Ok(Hand { on, from_s, to_s, arm })
+    Ok(Hand { on, from_s, to_s, action })
 }
 
 fn event(mut table: Section<'_>, rig: &RigParameters) -> Result<Event> {

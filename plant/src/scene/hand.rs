@@ -52,13 +52,13 @@ pub struct Hand {
     pub to_s: f64,
     /// What it does meanwhile.
     #[serde(flatten)]
-    pub arm: Arm,
+    pub action: HandAction,
 }
 
 /// What a hand does while it is on a part.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(untagged)]
-pub enum Arm {
+pub enum HandAction {
     /// Pushes with a constant force.
     Push {
         /// Force in +x, N.
@@ -142,13 +142,13 @@ impl HandAtWork {
             return 0.0;
         }
         let since_s = (cycle - self.from) as f64 / 1000.0;
-        match self.hand.arm {
-            Arm::Push { force_n, ramp_s } => {
+        match self.hand.action {
+            HandAction::Push { force_n, ramp_s } => {
                 let left_s = (self.to - cycle) as f64 / 1000.0;
                 let nearest_s = since_s.min(left_s);
                 if nearest_s < ramp_s { force_n * (nearest_s / ramp_s) } else { force_n }
             }
-            Arm::Guide { guide_to_m, travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } => {
+            HandAction::Guide { guide_to_m, travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } => {
                 let (x_m, v_m_per_s) = self.hand.on.motion(plant);
                 let x_from_m = *self.x_from_m.get_or_insert(x_m);
                 let z = (since_s / travel_s).min(1.0);

@@ -8,7 +8,7 @@
 //! It is called once for every cycle, in order, also for those that a late loop makes up for. Nothing here allocates.
 
 use super::hand::HandAtWork;
-use super::stop::{Holder, Holders, RigCall};
+use super::stop::{RigCall, StopHolder, StopHolders};
 use super::{Action, Event, HandForces, Scene, cycle_of};
 use crate::plant::Plant;
 
@@ -77,16 +77,16 @@ pub enum Outcome {
 #[derive(Debug, Clone)]
 pub struct People {
     script: Script,
-    holders: Holders,
+    holders: StopHolders,
     /// Somebody wiggles the pin in, up to this cycle.
     linking_until: Option<u64>,
     /// What is done when the carriage passes a place; has room for all events.
-    watched: Vec<Watched>,
+    triggers: Vec<PositionTrigger>,
 }
 
 /// What is done when the carriage passes a place.
 #[derive(Debug, Clone, Copy)]
-struct Watched {
+struct PositionTrigger {
     position_m: f64,
     /// The carriage was short of it when the watch began.
     short: bool,
@@ -101,8 +101,8 @@ impl People {
     /// Those of a scene, before cycle 0.
     #[must_use]
     pub fn new(scene: &Scene) -> Self {
-        let watched = Vec::with_capacity(scene.event.len());
-        People { script: Script::new(scene), holders: Holders::default(), linking_until: None, watched }
+        let triggers = Vec::with_capacity(scene.event.len());
+        People { script: Script::new(scene), holders: StopHolders::default(), linking_until: None, triggers }
     }
 
     /// Does what is due in `cycle` to the plant, tells what came of it, and gives the scripted hands' forces over the
@@ -118,14 +118,15 @@ impl People {
                 None => self.act(action, plant, &mut tell),
                 Some(position_m) => {
                     let short = is_short_of(position_m, plant);
-                    self.watched.push(Watched { position_m, short, action });
+                    self.triggers.push(PositionTrigger { position_m, short, action });
                 }
             }
         }
-        let passed =
-            |watched: &Watched, plant: &Plant| is_short_of(watched.position_m, plant) != watched.short;
-        while let Some(place) = self.watched.iter().position(|watched| passed(watched, plant)) {
-            let Watched { action, .. } = self.watched.remove(place);
+        let passed = |trigger: &PositionTrigger, plant: &Plant| {
+            is_short_of(trigger.position_m, plant) != trigger.short
+        };
+        while let Some(place) = self.triggers.iter().position(|trigger| passed(trigger, plant)) {
+            let PositionTrigger { action, .. } = self.triggers.remove(place);
             self.act(action, plant, &mut tell);
         }
         if let Some(until) = self.linking_until {
@@ -144,10 +145,10 @@ impl People {
     pub fn act(&mut self, action: Action, plant: &mut Plant, mut tell: impl FnMut(Outcome)) {
         match action {
             Action::EmergencyStop => {
-                self.emergency_stop(Holder::Rig, false, plant).into_iter().for_each(tell);
+                self.emergency_stop(StopHolder::Rig, false, plant).into_iter().for_each(tell);
             }
             Action::Release => {
-                let change = self.emergency_stop(Holder::Rig, true, plant);
+                let change = self.emergency_stop(StopHolder::Rig, true, plant);
                 let held = plant.emergency_stop().then_some(Outcome::StillHeld);
                 change.or(held).into_iter().for_each(tell);
             }
@@ -171,7 +172,12 @@ impl People {
     }
 
     /// Takes note of a stop or a release by one of those who can; tells what changed at the plant.
-    pub fn emergency_stop(&mut self, holder: Holder, release: bool, plant: &mut Plant) -> Option<Outcome> {
+    pub fn emergency_stop(
+        &mut self,
+        holder: StopHolder,
+        release: bool,
+        plant: &mut Plant,
+    ) -> Option<Outcome> {
         let tripped = self.holders.take(holder, release, plant)?;
         Some(if tripped { Outcome::Stopped } else { Outcome::Released })
     }

@@ -14,7 +14,7 @@ pub const REPEAT_CYCLES: u64 = 100;
 
 /// Who can hold the emergency stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Holder {
+pub enum StopHolder {
     /// Sender of the console's frame on the bus.
     Console,
     /// The rig's own button.
@@ -34,21 +34,21 @@ pub enum RigCall {
     Release,
 }
 
-/// Who holds the emergency stop now.
+/// Senders that hold the emergency stop now.
 #[derive(Debug, Clone, Default)]
-pub struct Holders {
+pub struct StopHolders {
     held: [bool; 4],
     /// Cycle from which on the rig calls next, while it holds.
     next_call: u64,
     release_to_call: bool,
 }
 
-impl Holders {
+impl StopHolders {
     /// Takes note of a stop or a release by one of them, and trips or releases the plant. The result says what changed there:
     /// true for tripped, false for released.
-    pub fn take(&mut self, holder: Holder, release: bool, plant: &mut Plant) -> Option<bool> {
+    pub fn take(&mut self, holder: StopHolder, release: bool, plant: &mut Plant) -> Option<bool> {
         let held = &mut self.held[holder as usize];
-        if holder == Holder::Rig && *held == release {
+        if holder == StopHolder::Rig && *held == release {
             self.next_call = 0;
             self.release_to_call = release;
         }
@@ -67,7 +67,7 @@ impl Holders {
 
     /// What the rig has to say in `cycle`, if anything; what is given counts as said.
     pub fn rig_call(&mut self, cycle: u64) -> Option<RigCall> {
-        if self.held[Holder::Rig as usize] {
+        if self.held[StopHolder::Rig as usize] {
             let due = cycle >= self.next_call;
             if due {
                 self.next_call = cycle + REPEAT_CYCLES;
@@ -89,25 +89,25 @@ mod tests {
 
     #[test]
     fn the_stop_is_released_when_nobody_holds_it() {
-        let (mut holders, mut plant) = (Holders::default(), plant());
-        assert_eq!(holders.take(Holder::Drive, true, &mut plant), None);
-        assert_eq!(holders.take(Holder::Rig, false, &mut plant), Some(true));
-        assert_eq!(holders.take(Holder::Console, false, &mut plant), None);
-        assert_eq!(holders.take(Holder::Rig, true, &mut plant), None);
+        let (mut holders, mut plant) = (StopHolders::default(), plant());
+        assert_eq!(holders.take(StopHolder::Drive, true, &mut plant), None);
+        assert_eq!(holders.take(StopHolder::Rig, false, &mut plant), Some(true));
+        assert_eq!(holders.take(StopHolder::Console, false, &mut plant), None);
+        assert_eq!(holders.take(StopHolder::Rig, true, &mut plant), None);
         assert!(plant.emergency_stop(), "the console still holds it");
-        assert_eq!(holders.take(Holder::Load, true, &mut plant), None);
-        assert_eq!(holders.take(Holder::Console, true, &mut plant), Some(false));
+        assert_eq!(holders.take(StopHolder::Load, true, &mut plant), None);
+        assert_eq!(holders.take(StopHolder::Console, true, &mut plant), Some(false));
         assert!(!plant.emergency_stop());
     }
 
     #[test]
     fn the_rig_calls_at_once_every_100_ms_and_once_at_the_release() {
-        let (mut holders, mut plant) = (Holders::default(), plant());
+        let (mut holders, mut plant) = (StopHolders::default(), plant());
         let mut calls = Vec::new();
         for cycle in 0..600 {
             match cycle {
-                150 | 200 => _ = holders.take(Holder::Rig, false, &mut plant),
-                400 | 450 => _ = holders.take(Holder::Rig, true, &mut plant),
+                150 | 200 => _ = holders.take(StopHolder::Rig, false, &mut plant),
+                400 | 450 => _ = holders.take(StopHolder::Rig, true, &mut plant),
                 _ => {}
             }
             calls.extend(holders.rig_call(cycle).map(|call| (cycle, call)));
@@ -118,10 +118,10 @@ mod tests {
 
     #[test]
     fn what_others_hold_the_rig_does_not_call_out() {
-        let (mut holders, mut plant) = (Holders::default(), plant());
-        holders.take(Holder::Load, false, &mut plant);
+        let (mut holders, mut plant) = (StopHolders::default(), plant());
+        holders.take(StopHolder::Load, false, &mut plant);
         assert_eq!(holders.rig_call(7), None);
-        holders.take(Holder::Rig, true, &mut plant);
+        holders.take(StopHolder::Rig, true, &mut plant);
         assert_eq!(holders.rig_call(8), None, "it released nothing");
     }
 }

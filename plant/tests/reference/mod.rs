@@ -55,7 +55,7 @@ pub(crate) struct ReferenceAxis {
 
 /// What the sensors would show, without noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Seen {
+pub(crate) struct SensorReadings {
     pub(crate) x: [f64; 2],
     pub(crate) force: [f64; 2],
     pub(crate) p_a: [f64; 2],
@@ -139,12 +139,12 @@ impl Reference {
         }
     }
 
-    pub(crate) fn seen(&self, inputs: &Inputs) -> Seen {
+    pub(crate) fn readings(&self, inputs: &Inputs) -> SensorReadings {
         let contact = self.contact();
         let regime = self.regime(inputs);
         let acceleration = self.acceleration(inputs, 0, &regime);
         let drive = (CARRIAGE + self.added) * acceleration - contact - inputs.hand_force_carriage_n;
-        Seen {
+        SensorReadings {
             x: self.axes.map(|axis| axis.x),
             force: [drive, -contact + inputs.hand_force_load_n],
             p_a: self.axes.map(|axis| axis.p_a),

@@ -8,7 +8,7 @@
 
 use plant::{Inputs, Plant, RigParameters, State};
 
-use crate::reference::{Method, Reference, Seen};
+use crate::reference::{Method, Reference, SensorReadings};
 use crate::scenario::{Scenario, WINDOW_MS};
 
 /// Noise of the sensors, rms: m, Pa, N [rig-model.md, Sensors].
@@ -25,7 +25,7 @@ pub(crate) enum Scheme {
 
 /// What the reference shows at each millisecond of a window, and where corners lie.
 pub(crate) struct Window {
-    seen: Vec<Seen>,
+    seen: Vec<SensorReadings>,
     near_corner: Vec<bool>,
 }
 
@@ -62,7 +62,7 @@ pub(crate) fn reference_windows(scenario: &Scenario, steps: u32) -> Vec<Window> 
         for k in 0..WINDOW_MS {
             let before = rig.corners;
             rig.advance(&scenario.inputs[start + k], steps, Method::RungeKutta4);
-            window.seen.push(rig.seen(&Inputs::default()));
+            window.seen.push(rig.readings(&Inputs::default()));
             if rig.corners != before {
                 (k.saturating_sub(5)..(k + 6).min(WINDOW_MS))
                     .for_each(|near| window.near_corner[near] = true);
@@ -111,14 +111,14 @@ pub(crate) fn compare(
     }
 }
 
-fn run(rig: &RigParameters, scheme: Scheme, state: &State, inputs: &[Inputs]) -> Vec<Seen> {
+fn run(rig: &RigParameters, scheme: Scheme, state: &State, inputs: &[Inputs]) -> Vec<SensorReadings> {
     match scheme {
         Scheme::Plant(substeps) => {
             let mut plant = Plant::in_state(rig, state).expect("a recorded state").with_substeps(substeps);
             let see = |inputs: &Inputs| {
                 plant.step(inputs);
                 let truth = plant.truth(&Inputs::default());
-                Seen {
+                SensorReadings {
                     x: truth.axes.map(|axis| axis.position_m),
                     force: truth.axes.map(|axis| axis.sensor_force_n),
                     p_a: truth.axes.map(|axis| axis.pressure_a_pa),
@@ -131,7 +131,7 @@ fn run(rig: &RigParameters, scheme: Scheme, state: &State, inputs: &[Inputs]) ->
             let mut reference = Reference::from_state(state);
             let see = |inputs: &Inputs| {
                 reference.advance(inputs, steps, method);
-                reference.seen(&Inputs::default())
+                reference.readings(&Inputs::default())
             };
             inputs.iter().map(see).collect()
         }

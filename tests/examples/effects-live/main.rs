@@ -1,7 +1,7 @@
 //! Prints, as Markdown, what effects cost the rig's loop in real time: `scripts/effects-live`.
 #![allow(clippy::print_stdout)] // This is what it is for.
 
-use plant::effects::sheet::Switched;
+use plant::effects::sheet::ActiveEffect;
 use system_tests::Scene;
 use system_tests::hidden::{Extreme, LIVELY, LoopTiming, drawn, everything, live};
 
@@ -11,7 +11,7 @@ const SECONDS: u32 = 10;
 const ROUNDS: usize = 5;
 
 fn main() {
-    let kinds: [(&str, Vec<Switched>); 5] = [
+    let kinds: [(&str, Vec<ActiveEffect>); 5] = [
         ("none", Vec::new()),
         ("piston-leakage", drawn_of("piston-leakage")),
         ("ten, seed 7", drawn(7, 10)),
@@ -51,7 +51,7 @@ fn main() {
 }
 
 /// The first seed's draw of this effect alone.
-fn drawn_of(name: &str) -> Vec<Switched> {
+fn drawn_of(name: &str) -> Vec<ActiveEffect> {
     let found = (0..).map(|seed| drawn(seed, 1)).find(|effects| effects[0].name == name);
     found.expect("every effect comes up")
 }

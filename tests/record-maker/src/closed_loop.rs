@@ -9,7 +9,7 @@ use super::{Experiment, MakeError, ROWS, Recipe, Record, Row, TrueAxis, hidden};
 use axis_control::axis::AxisController;
 use axis_control::setup::FileArguments;
 use axis_control::setup::{Inputs, Mode};
-use plant::scene::{Holder, Outcome, RigCall};
+use plant::scene::{Outcome, RigCall, StopHolder};
 use plant::{Axis, AxisReadings, RigParameters, Scene};
 use rehearsal::Rehearsal;
 use rig_node::{RigCondition, SimulatedRig};
@@ -362,7 +362,7 @@ impl SimulatedRig for RecordedRig {
     }
 
     /// The record maker has no emergency stop: a trip makes the record fail.
-    fn emergency_stop(&mut self, _holder: Holder, release: bool) -> Option<Outcome> {
+    fn emergency_stop(&mut self, _holder: StopHolder, release: bool) -> Option<Outcome> {
         self.stopped |= !release;
         None
     }

@@ -2,7 +2,7 @@
 
 use crate::sheet::{MeanAndRange, SEEDS};
 use plant::Axis;
-use plant::scene::{Arm, Hand, Part};
+use plant::scene::{Hand, HandAction, Part};
 use rehearsal::RehearsalRow;
 use std::error::Error;
 use tuning::cases::{Case, CaseSpec, figures};
@@ -70,8 +70,8 @@ fn reported(case: &Case, seed: u64) -> Result<[Option<f64>; 8], TrialError> {
     let run = case.run(&trial)?;
     let mut pulled = case.scene.clone();
     let from_s = case.scene.hand[0].to_s;
-    let arm = Arm::Push { force_n: PULL_N, ramp_s: 0.0 };
-    pulled.hand.push(Hand { on: Part::LoadEye, from_s, to_s: PULL_TO_S, arm });
+    let action = HandAction::Push { force_n: PULL_N, ramp_s: 0.0 };
+    pulled.hand.push(Hand { on: Part::LoadEye, from_s, to_s: PULL_TO_S, action });
     let pulled = rehearsed::rehearse(&case.inputs, &pulled, &trial)?;
     let figure = figures(&run);
     let let_go = (case.scene.hand[0].to_s * 1e3).round() as usize;
