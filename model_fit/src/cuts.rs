@@ -15,7 +15,7 @@ const BANDS: usize = 5;
 
 /// Partition of the rows of all records into blocks; rows of the last block are not judged.
 #[derive(Clone, Debug)]
-pub(crate) struct BlockPartition {
+pub(crate) struct RowBlocks {
     pub(crate) blocks: usize,
     /// Block of each record and row.
     pub(super) block_of: Vec<Vec<usize>>,
@@ -23,7 +23,7 @@ pub(crate) struct BlockPartition {
 
 impl Fitting<'_> {
     /// Each record in blocks of time.
-    pub(crate) fn blocks_in_time(&self) -> BlockPartition {
+    pub(crate) fn blocks_in_time(&self) -> RowBlocks {
         let blocks = BLOCKS * self.records.len();
         let of_record = |(record, measured): (usize, &MeasuredRecord)| {
             let rows = self.rows(record);
@@ -33,11 +33,11 @@ impl Fitting<'_> {
             };
             (0..measured.time_s.len()).map(block).collect()
         };
-        BlockPartition { blocks, block_of: self.records.iter().enumerate().map(of_record).collect() }
+        RowBlocks { blocks, block_of: self.records.iter().enumerate().map(of_record).collect() }
     }
 
     /// Bands of what folds go over, by its number in the model, each with as many rows of all records.
-    pub(crate) fn blocks_in_bands(&self, fold: usize) -> BlockPartition {
+    pub(crate) fn blocks_in_bands(&self, fold: usize) -> RowBlocks {
         let places = self.records.iter().enumerate();
         let mut order: Vec<(f64, usize, usize)> = places
             .flat_map(|(record, measured)| {
@@ -51,6 +51,6 @@ impl Fitting<'_> {
         for (place, (_, record, row)) in order.iter().enumerate() {
             block_of[*record][*row] = place * BANDS / order.len();
         }
-        BlockPartition { blocks: BANDS, block_of }
+        RowBlocks { blocks: BANDS, block_of }
     }
 }

@@ -10,7 +10,7 @@
 //!
 //! Sources: Ljung, System Identification, 2nd edition, 7.2 (output error), 15.3 (concentrated likelihood); Björck 1996, 9.
 
-use super::cuts::BlockPartition;
+use super::cuts::RowBlocks;
 use super::normal::{Normal, solved};
 use super::record::MeasuredRecord;
 use crate::estimator::{Convergence, Estimator, Iterate, Options, Step};
@@ -375,11 +375,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// Normal equations of each block of a cut and output; the last are those of rows that judge nothing.
-    pub(crate) fn normals(
-        &self,
-        values_si: &[f64],
-        cut: &BlockPartition,
-    ) -> Result<Vec<Vec<Normal>>, Failure> {
+    pub(crate) fn normals(&self, values_si: &[f64], cut: &RowBlocks) -> Result<Vec<Vec<Normal>>, Failure> {
         let count = self.model.outputs.len();
         let mut blocks = vec![vec![Normal::zero(self.unknowns.len()); count]; cut.blocks + 1];
         for record in 0..self.records.len() {

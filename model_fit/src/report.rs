@@ -394,13 +394,13 @@ pub(crate) fn friction(model: &Model, friction: &model::Friction) -> String {
 
 pub(crate) fn place(model: &Model, suspect: usize) -> String {
     let target = model.suspects[suspect].target;
-    let id = match target {
+    let kind = match target {
         model::Target::Input(_) => "input",
         model::Target::State(_) => "equation of",
         model::Target::Definition(_) => "definition",
         model::Target::Output(_) => "output",
     };
-    format!("{id} {}", model.target_name(target))
+    format!("{kind} {}", model.target_name(target))
 }
 
 pub(crate) fn term(model: &Model, suspect: usize) -> String {

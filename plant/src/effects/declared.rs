@@ -221,7 +221,7 @@ impl Declared {
     /// Its value, in SI, at these values of [`VARIABLES`], where the plant begins there.
     #[must_use]
     pub fn value(&self, at: &[f64; VARIABLES.len()]) -> f64 {
-        let kept: Vec<f64> = self.memory.iter().map(|one| one.kept().begin(at)).collect();
+        let kept: Vec<f64> = self.memory.iter().map(|one| one.law().begin(at)).collect();
         self.value_keeping(at, &kept)
     }
 

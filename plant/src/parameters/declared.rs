@@ -26,7 +26,7 @@
 //! A term needs the value of each number, and its range is that value alone where the file gives none. A suspect needs ranges,
 //! and its values are those at which it adds nothing, 0 where the file gives none.
 
-use super::laws::{Laws, used};
+use super::laws::{Laws, bound_law};
 use super::reader::ParameterError;
 use crate::effects::declared::{
     Declared, MOST_PARAMETERS, MOST_REMEMBERED, MOST_TERMS, Number, SENSOR_FORCE, Target, VARIABLES,
