@@ -6,20 +6,20 @@
 //! ```
 
 use super::LoggedBy;
-use super::cycles::Logged;
+use super::cycles::LoggedFrame;
 use plant::Axis;
 use protocol::commands::{CommandIntake, STALE_AFTER_CYCLES};
 use protocol::frames::Frame;
 use protocol::live_cycles::LiveCycles;
 use std::collections::VecDeque;
 
-/// The valves of both axes, cycle by cycle.
-pub(super) struct Acting {
+/// Valve commands that act on both axes, cycle by cycle.
+pub(super) struct ValveCommands {
     intakes: [CommandIntake; 2],
     live: LiveCycles,
     logged_by: LoggedBy,
     /// Commands and stops that no cycle has taken yet.
-    waiting: VecDeque<Logged>,
+    waiting: VecDeque<LoggedFrame>,
     /// Who holds the emergency stop: console, rig, drive, load.
     holders: [bool; 4],
     /// A stop from before the log, known from the rig's status only.
@@ -31,7 +31,7 @@ pub(super) struct Acting {
     opening: [Option<f64>; 2],
 }
 
-impl Acting {
+impl ValveCommands {
     /// Before the log's first cycle.
     pub(super) fn new(first: u64, logged_by: LoggedBy) -> Self {
         Self {
@@ -49,11 +49,11 @@ impl Acting {
     }
 
     /// Processes a frame, in the order of the log.
-    pub(super) fn note(&mut self, logged: Logged) {
+    pub(super) fn note(&mut self, logged: LoggedFrame) {
         match logged.frame {
             Frame::RigEmergencyStop(stop) => self.holders[1] = !stop.release,
             Frame::RigStatus(status) => {
-                let valves = |logged: &Logged| {
+                let valves = |logged: &LoggedFrame| {
                     matches!(logged.frame, Frame::DriveValveCommand(_) | Frame::LoadValveCommand(_))
                 };
                 let holder_known = self.holders.contains(&true) || !self.waiting.iter().all(valves);
@@ -74,11 +74,11 @@ impl Acting {
         self.opening
     }
 
-    /// Commands that act over the cycle that began at `begin_ns`.
-    pub(super) fn latch(&mut self, cycle: u64, begin_ns: u64) -> [Option<f64>; 2] {
+    /// Commands that act over the cycle that began at `start_ns`.
+    pub(super) fn latch(&mut self, cycle: u64, start_ns: u64) -> [Option<f64>; 2] {
         self.live.sent(cycle);
         self.fresh = [false; 2];
-        while let Some(logged) = self.waiting.pop_front_if(|logged| logged.stamp_ns < begin_ns) {
+        while let Some(logged) = self.waiting.pop_front_if(|logged| logged.stamp_ns < start_ns) {
             match logged.frame {
                 Frame::DriveValveCommand(command) => self.take(Axis::Drive, command),
                 Frame::LoadValveCommand(command) => self.take(Axis::Load, command),

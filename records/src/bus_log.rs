@@ -10,8 +10,8 @@
 //!
 //! Source: bus.md, Time and Frames.
 
-use super::acting::Acting;
-use super::cycles::{self, Cycles, Logged};
+use super::acting::ValveCommands;
+use super::cycles::{self, Cycles, LoggedFrame};
 use super::{Channel, Form, LoggedBy, ReadError, Record, RigSetup, Signal};
 use plant::{Axis, PERIOD_S};
 use protocol::frames::{DecodeError, Frame, RigStatus, Sensors};
@@ -43,13 +43,13 @@ pub(super) fn read(file: &Path, logged_by: LoggedBy) -> Result<Record, ReadError
     if cycles.guessed {
         record.warn(None, "no tick in the log: the time of the first row is a guess within 16 ms");
     }
-    let begins = Begins::of(file, &log, &cycles, logged_by);
-    rows(file, &log, &cycles, first, &begins, logged_by, &mut record)?;
+    let starts = CycleStarts::of(file, &log, &cycles, logged_by);
+    rows(file, &log, &cycles, first, &starts, logged_by, &mut record)?;
     Ok(record)
 }
 
 /// The frames that `rig.dbc` knows; the others are counted.
-fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, ReadError> {
+fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<LoggedFrame>, ReadError> {
     let mut log = Vec::new();
     let (mut unknown, mut malformed) = (Vec::new(), Vec::new());
     let cut = text.rfind('\n').map_or(0, |end| end + 1);
@@ -61,7 +61,7 @@ fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, R
             return Err(ReadError::at(file, line, format!("'{text}' {message}")));
         };
         match Frame::decode(&read.frame) {
-            Ok(frame) => log.push(Logged { line, stamp_ns: read.stamp_ns, frame }),
+            Ok(frame) => log.push(LoggedFrame { line, stamp_ns: read.stamp_ns, frame }),
             Err(DecodeError::NotPlainData { .. } | DecodeError::UnknownIdentifier { .. }) => {
                 unknown.push(line)
             }
@@ -79,15 +79,15 @@ fn frames(file: &Path, text: &str, record: &mut Record) -> Result<Vec<Logged>, R
 }
 
 /// Start times of cycles, by the clock of the log.
-enum Begins {
+enum CycleStarts {
     /// From the run's summary: start of cycle 0.
     Reported { zero_ns: u64 },
     /// From the earliest sensor frames, by blocks of cycles.
     Estimated { blocks: BTreeMap<u64, u64> },
 }
 
-impl Begins {
-    fn of(file: &Path, log: &[Logged], cycles: &Cycles, logged_by: LoggedBy) -> Self {
+impl CycleStarts {
+    fn of(file: &Path, log: &[LoggedFrame], cycles: &Cycles, logged_by: LoggedBy) -> Self {
         let reported = (logged_by == LoggedBy::Rig).then(|| reported_zero_ns(file)).flatten();
         let mut blocks: BTreeMap<u64, u64> = BTreeMap::new();
         for (logged, cycle) in log.iter().zip(&cycles.of) {
@@ -103,7 +103,7 @@ impl Begins {
         reported.filter(fits).map_or(Self::Estimated { blocks }, |zero_ns| Self::Reported { zero_ns })
     }
 
-    fn begin_ns(&self, cycle: u64) -> u64 {
+    fn start_ns(&self, cycle: u64) -> u64 {
         let zero_ns = match self {
             Self::Reported { zero_ns } => *zero_ns,
             Self::Estimated { blocks } => {
@@ -124,7 +124,7 @@ fn reported_zero_ns(file: &Path) -> Option<u64> {
     Some((summary.bus_log_cycle_zero_s? * 1e9).round() as u64)
 }
 
-fn expect_no_long_hole(file: &Path, log: &[Logged], cycles: &Cycles) -> Result<(), ReadError> {
+fn expect_no_long_hole(file: &Path, log: &[LoggedFrame], cycles: &Cycles) -> Result<(), ReadError> {
     let lines: BTreeMap<u64, u64> =
         log.iter().zip(&cycles.of).filter_map(|(logged, cycle)| Some(((*cycle)?, logged.line))).collect();
     for ((before, _), (after, line)) in lines.iter().zip(lines.iter().skip(1)) {
@@ -140,15 +140,15 @@ fn expect_no_long_hole(file: &Path, log: &[Logged], cycles: &Cycles) -> Result<(
 
 fn rows(
     file: &Path,
-    log: &[Logged],
+    log: &[LoggedFrame],
     cycles: &Cycles,
     first: u64,
-    begins: &Begins,
+    starts: &CycleStarts,
     logged_by: LoggedBy,
     record: &mut Record,
 ) -> Result<(), ReadError> {
     let mut sent: BTreeMap<u64, Row> = BTreeMap::new();
-    let mut statuses = Statuses::default();
+    let mut statuses = StatusSummary::default();
     let mut newest = first;
     for (logged, cycle) in log.iter().zip(&cycles.of) {
         match (logged.frame, cycle) {
@@ -184,7 +184,7 @@ fn rows(
             .for_each(|channel| record.add(channel));
     }
     record.add(Channel::SupplyPressure);
-    let mut acting = Acting::new(first, logged_by);
+    let mut acting = ValveCommands::new(first, logged_by);
     let mut frames = log.iter().zip(&cycles.of).peekable();
     let mut line = log.first().map_or(1, |logged| logged.line);
     let mut lost = [0_u64; 2];
@@ -192,14 +192,14 @@ fn rows(
         let row = sent.remove(&cycle).unwrap_or_default();
         line = row.line.unwrap_or(line);
         // Everything up to the sensors of this cycle, and what arrived before it began.
-        let begin_ns = begins.begin_ns(cycle);
+        let start_ns = starts.start_ns(cycle);
         while let Some((logged, _)) =
-            frames.next_if(|(logged, of)| of.map_or(logged.stamp_ns < begin_ns + CYCLE_NS, |of| of <= cycle))
+            frames.next_if(|(logged, of)| of.map_or(logged.stamp_ns < start_ns + CYCLE_NS, |of| of <= cycle))
         {
             acting.note(*logged);
         }
         let skipped = cycles.skipped.contains(&cycle) && row.line.is_none();
-        let valves = if skipped { acting.skip(cycle) } else { acting.latch(cycle, begin_ns) };
+        let valves = if skipped { acting.skip(cycle) } else { acting.latch(cycle, start_ns) };
         record.push_row(line, cycle as f64 * PERIOD_S);
         for axis in Axis::ALL.into_iter().filter(|axis| axes[axis.index()]) {
             lost[axis.index()] += u64::from(!skipped && row.sensors[axis.index()].is_none());
@@ -209,7 +209,7 @@ fn rows(
             record.put(Channel::SupplyPressure, pressure_pa);
         }
     }
-    add_warnings(record, log, begins, cycles, lost, &acting);
+    add_warnings(record, log, starts, cycles, lost, &acting);
     Ok(())
 }
 
@@ -221,7 +221,7 @@ struct Row {
 }
 
 impl Row {
-    fn take(
+    fn add_sensors(
         &mut self,
         file: &Path,
         axis: usize,
@@ -257,12 +257,12 @@ fn put_row(record: &mut Record, axis: Axis, valve: Option<f64>, sensors: Option<
 
 /// Status of the rig as far as a reader must report it.
 #[derive(Default)]
-struct Statuses {
+struct StatusSummary {
     linked: Option<bool>,
     saturated: bool,
 }
 
-impl Statuses {
+impl StatusSummary {
     fn take(&mut self, line: u64, status: &RigStatus, record: &mut Record) {
         match self.linked.replace(status.linked) {
             None => record.setup.linked = status.linked,
@@ -289,11 +289,11 @@ impl Statuses {
 
 fn add_warnings(
     record: &mut Record,
-    log: &[Logged],
-    begins: &Begins,
+    log: &[LoggedFrame],
+    starts: &CycleStarts,
     cycles: &Cycles,
     lost: [u64; 2],
-    acting: &Acting,
+    acting: &ValveCommands,
 ) {
     for axis in Axis::ALL.into_iter().filter(|axis| record.has_axis(*axis)).collect::<Vec<_>>() {
         let name = axis.name();
@@ -311,10 +311,10 @@ fn add_warnings(
     if !cycles.skipped.is_empty() {
         record.warn(None, format!("the rig skipped {} cycles: they have no sensors", cycles.skipped.len()));
     }
-    if matches!(begins, Begins::Estimated { .. }) {
+    if matches!(starts, CycleStarts::Estimated { .. }) {
         let close = log.iter().filter(|logged| {
             let command = matches!(logged.frame, Frame::DriveValveCommand(_) | Frame::LoadValveCommand(_));
-            let zero_ns = begins.begin_ns(0);
+            let zero_ns = starts.start_ns(0);
             let into_cycle = logged.stamp_ns.saturating_sub(zero_ns) % CYCLE_NS;
             command && into_cycle >= CYCLE_NS - MARGIN_NS
         });

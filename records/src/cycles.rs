@@ -22,7 +22,7 @@ const SKIPPED_RANGE: u64 = 1 << 16;
 
 /// A frame of a log that `rig.dbc` knows.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Logged {
+pub(super) struct LoggedFrame {
     pub(super) line: u64,
     pub(super) stamp_ns: u64,
     pub(super) frame: Frame,
@@ -37,7 +37,7 @@ pub(super) struct Cycles {
     pub(super) guessed: bool,
 }
 
-pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
+pub(super) fn find(file: &Path, log: &[LoggedFrame]) -> Result<Cycles, ReadError> {
     let mut numbers: Vec<Option<i64>> = vec![None; log.len()];
     let mut known: Option<(i64, u64)> = None;
     let mut anchored = false;
@@ -97,7 +97,7 @@ pub(super) fn find(file: &Path, log: &[Logged]) -> Result<Cycles, ReadError> {
 }
 
 /// For each frame, the cycle of the first tick after it.
-fn next_ticks(log: &[Logged]) -> Vec<Option<u32>> {
+fn next_ticks(log: &[LoggedFrame]) -> Vec<Option<u32>> {
     let mut next = None;
     let mut ticks: Vec<_> = log
         .iter()
@@ -161,20 +161,20 @@ mod tests {
     use super::*;
     use protocol::frames::Sensors;
 
-    fn sensors(cycle: u64, stamp_ns: u64) -> Logged {
+    fn sensors(cycle: u64, stamp_ns: u64) -> LoggedFrame {
         let alive = (cycle % ALIVE_RANGE) as u8;
         let sensors =
             Sensors { position_m: 0.1, force_n: 0.0, pressure_a_pa: 1e5, pressure_b_pa: 1e5, alive };
-        Logged { line: 1, stamp_ns, frame: Frame::DriveSensors(sensors) }
+        LoggedFrame { line: 1, stamp_ns, frame: Frame::DriveSensors(sensors) }
     }
 
-    fn tick(cycle: u64, skipped: u16, stamp_ns: u64) -> Logged {
+    fn tick(cycle: u64, skipped: u16, stamp_ns: u64) -> LoggedFrame {
         let catch_up = false;
         let tick = Tick { cycle: cycle as u32, skipped, catch_up, lockstep: false, ending: false };
-        Logged { line: 2, stamp_ns, frame: Frame::Tick(tick) }
+        LoggedFrame { line: 2, stamp_ns, frame: Frame::Tick(tick) }
     }
 
-    fn found(log: &[Logged]) -> Vec<u64> {
+    fn found(log: &[LoggedFrame]) -> Vec<u64> {
         find(Path::new("a.log"), log).unwrap().of.into_iter().flatten().collect()
     }
 

@@ -1,6 +1,6 @@
 //! Reads a foreign CSV by a mapping file.
 
-use super::mapping::Time;
+use super::mapping::TimeSource;
 use super::table::Table;
 use super::{Channel, Form, Mapping, ReadError, Record};
 use std::path::Path;
@@ -10,8 +10,8 @@ pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> 
     let mut record = Record::new(file, Form::Foreign, mapping.setup);
     record.nominal_period_s = mapping.nominal_period_s;
     let time = match &mapping.time {
-        Time::Column { column, factor } => Some((table.required(column)?, *factor)),
-        Time::Counted { .. } => None,
+        TimeSource::Column { column, factor } => Some((table.required(column)?, *factor)),
+        TimeSource::Counted { .. } => None,
     };
     let mut places = Vec::new();
     for mapped in &mapping.channels {
@@ -41,8 +41,8 @@ pub(super) fn read(file: &Path, mapping: &Mapping) -> Result<Record, ReadError> 
         let value = |place: usize| table.number(*line, place, cell(place), mapping.decimal_comma);
         let time_s = match (time, &mapping.time) {
             (Some((place, factor)), _) => value(place)? * factor,
-            (None, Time::Counted { period_s }) => number as f64 * period_s,
-            (None, Time::Column { .. }) => unreachable!("its place was found above"),
+            (None, TimeSource::Counted { period_s }) => number as f64 * period_s,
+            (None, TimeSource::Column { .. }) => unreachable!("its place was found above"),
         };
         let mut present = Vec::new();
         for (mapped, place) in &places {

@@ -19,14 +19,14 @@ pub struct Mapping {
     pub(super) absent: Vec<String>,
     pub(super) ignore: Vec<String>,
     pub(super) setup: RigSetup,
-    pub(super) time: Time,
+    pub(super) time: TimeSource,
     pub(super) nominal_period_s: Option<f64>,
     pub(super) channels: Vec<MappedChannel>,
 }
 
 /// Source of the time of a row.
 #[derive(Clone, Debug)]
-pub(super) enum Time {
+pub(super) enum TimeSource {
     Column {
         column: String,
         factor: f64,
@@ -176,16 +176,16 @@ fn setup(mut section: Section<'_>) -> Result<RigSetup, SettingsError> {
 }
 
 /// Where the time comes from, and the period that was meant.
-fn time(mut section: Section<'_>) -> Result<(Time, Option<f64>), SettingsError> {
+fn time(mut section: Section<'_>) -> Result<(TimeSource, Option<f64>), SettingsError> {
     let mut period = |key| fitting(&mut section, key, "more than 0", |period_s| period_s > 0.0);
     let (nominal_period_s, period_s) = (period("nominal_period_s")?, period("period_s")?);
     let column = section.text("column")?.map(|column| column.text);
     let factor = section.choice("unit", TIMES)?;
     section.finish()?;
     match (column, period_s) {
-        (Some(column), None) => Ok((Time::Column { column, factor }, nominal_period_s)),
+        (Some(column), None) => Ok((TimeSource::Column { column, factor }, nominal_period_s)),
         (None, Some(period_s)) if !section.has("unit") => {
-            Ok((Time::Counted { period_s }, Some(nominal_period_s.unwrap_or(period_s))))
+            Ok((TimeSource::Counted { period_s }, Some(nominal_period_s.unwrap_or(period_s))))
         }
         _ => {
             let allowed = "allowed is a column with its unit, or period_s alone for rows without time";
