@@ -12,10 +12,10 @@ use plant::effects::sheet;
 use std::io::Write;
 
 /// An effect with its place and its amplitude, or a parameter with its path and its value.
-type Given = (&'static str, &'static str, f64);
+type EffectSetting = (&'static str, &'static str, f64);
 
 /// Twins.
-const PAIRS: &[(Given, Given)] = &[
+const PAIRS: &[(EffectSetting, EffectSetting)] = &[
     (("spool-second-order", "drive", 90.0), ("command-dead-time", "drive", 1.0)),
     (("line-delay", "drive", 1.0), ("command-dead-time", "drive", 2.9)),
     (("position-sensor-lag", "drive", 2.0), ("time-skew", "drive.position", 2.0)),
@@ -46,7 +46,7 @@ const PAIRS: &[(Given, Given)] = &[
     (("supply-droop", "supply", 0.3), ("line-resistance", "drive", 0.2)),
 ];
 
-fn explanation((name, place, number): &Given) -> Result<Explanation, Box<dyn std::error::Error>> {
+fn explanation((name, place, number): &EffectSetting) -> Result<Explanation, Box<dyn std::error::Error>> {
     let baseline = RigParameters::baseline();
     if name.starts_with("parameter:") {
         return Ok(Explanation {

@@ -9,7 +9,7 @@ mod libraries;
 mod text;
 
 use crate::calibrate::calibrate;
-use crate::calibrate::finer::finer;
+use crate::calibrate::finer::calibrate_tables;
 use crate::cli::{
     Cli, Command, ExtendArguments, NameArguments, NextArguments, RecordArguments, VerifyArguments,
 };
@@ -261,10 +261,10 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
     let (rig_file, gridded) = gridded_records(arguments)?;
     let engine = Engine::new(&gridded, &rig_file.rig);
     let calibrated = calibrate(&engine, &Linearisation::at_baseline(&engine));
-    let finer = finer(&engine, &calibrated).ok_or_else(|| {
+    let tables = calibrate_tables(&engine, &calibrated).ok_or_else(|| {
         CommandError::BadData("what fits these records best is out of the rig file's ranges".to_owned())
     })?;
-    let quantities = finer.quantities;
+    let quantities = tables.quantities;
     let mut text = String::new();
     for quantity in &quantities {
         let _ = match (quantity.standard_error, quantity.before) {
@@ -279,7 +279,7 @@ fn calibrate_command(arguments: &RecordArguments) -> Result<Exit, CommandError> 
         let records: Vec<String> = arguments.train.iter().map(|path| path.display().to_string()).collect();
         let mass_axis = workflow::mass_axis(gridded[0].measured);
         let text =
-            crate::extend::extend(&rig_file.text, &rig_file.file, &[], &finer.changed, mass_axis, &records)
+            crate::extend::extend(&rig_file.text, &rig_file.file, &[], &tables.changed, mass_axis, &records)
                 .map_err(WorkflowError::from)?;
         out.write("rig.toml", &text)?;
     }

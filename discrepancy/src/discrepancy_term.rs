@@ -57,48 +57,48 @@ const BALANCES: [&[UnknownKind]; 5] = [
     &[UnknownKind::ForceSensor],
 ];
 
-/// What a group's hats are over.
+/// The variables that a group's hats are functions of.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Over {
+enum Regressor {
     Constant,
     Variable(usize),
     /// Hats over the first, times the second.
     Product([usize; 2]),
 }
 
-impl Over {
-    fn all() -> impl Iterator<Item = Over> {
-        let single = (0..VARIABLES.len()).map(Over::Variable);
-        [Over::Constant].into_iter().chain(single).chain(PRODUCTS.map(Over::Product))
+impl Regressor {
+    fn all() -> impl Iterator<Item = Regressor> {
+        let single = (0..VARIABLES.len()).map(Regressor::Variable);
+        [Regressor::Constant].into_iter().chain(single).chain(PRODUCTS.map(Regressor::Product))
     }
 
     fn is_history(self) -> bool {
-        matches!(self, Over::Variable(at) if VARIABLES[at].complexity == MEMORY)
+        matches!(self, Regressor::Variable(at) if VARIABLES[at].complexity == MEMORY)
     }
 
     fn names(self) -> Vec<&'static str> {
         match self {
-            Over::Constant => vec![CONSTANT],
-            Over::Variable(at) => vec![VARIABLES[at].name],
-            Over::Product(pair) => pair.map(|at| VARIABLES[at].name).to_vec(),
+            Regressor::Constant => vec![CONSTANT],
+            Regressor::Variable(at) => vec![VARIABLES[at].name],
+            Regressor::Product(pair) => pair.map(|at| VARIABLES[at].name).to_vec(),
         }
     }
 }
 
-/// A balance of an axis with a variable, and what it gains.
+/// A balance of an axis with a regressor, and its evidence.
 #[derive(Clone, Copy, Debug)]
 struct Group {
     axis: usize,
     /// One, or both chambers with hats of their own.
     kinds: &'static [UnknownKind],
-    over: Over,
+    regressor: Regressor,
     log_evidence: f64,
     /// Reduction of the loss at the best size.
     loss_reduction: f64,
 }
 
-/// The model that a term is sought beside.
-pub struct Beside<'a> {
+/// The model to which a term is added.
+pub struct ReferenceModel<'a> {
     pub effects: &'a [EffectEstimate],
     /// Of the baseline parameters, in the order of [`crate::parameters::PARAMETERS`].
     pub factors: [f64; COUNT],
@@ -110,7 +110,7 @@ fn plain_first(groups: Vec<Group>) -> Vec<Group> {
     let choice = (groups.len() as f64).ln();
     let most = |groups: &[Group]| groups.first().map_or(0.0, |group| group.log_evidence);
     let (history, plain): (Vec<Group>, Vec<Group>) =
-        groups.into_iter().partition(|group| group.over.is_history());
+        groups.into_iter().partition(|group| group.regressor.is_history());
     let exceeds = |group: &Group| {
         group.log_evidence - choice > most(&plain)
             && MIN_LOG_EVIDENCE_RATIO * group.log_evidence > most(&plain)
@@ -124,12 +124,12 @@ fn plain_first(groups: Vec<Group>) -> Vec<Group> {
 }
 
 /// The term of a model; `None` where none has [`MIN_LOG_EVIDENCE`].
-pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedTerm> {
-    let mut groups = plain_first(Term::new(engine, beside)?.groups());
+pub fn located_term(engine: &Engine<'_>, reference: &ReferenceModel<'_>) -> Option<LocatedTerm> {
+    let mut groups = plain_first(Term::new(engine, reference)?.groups());
     let best = *groups.first().filter(|best| best.log_evidence > MIN_LOG_EVIDENCE)?;
-    let constant = groups
-        .iter()
-        .position(|group| (group.axis, group.kinds, group.over) == (best.axis, best.kinds, Over::Constant));
+    let constant = groups.iter().position(|group| {
+        (group.axis, group.kinds, group.regressor) == (best.axis, best.kinds, Regressor::Constant)
+    });
     // A law that is nearly or mostly its mean.
     if let Some(at) = constant {
         let ratio = groups[at].log_evidence / best.log_evidence;
@@ -142,7 +142,7 @@ pub fn located_term(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<LocatedT
     let mut variables: Vec<LocatedVariable> = Vec::new();
     let of_balance = groups.iter().filter(|group| group.axis == best.axis && group.kinds == best.kinds);
     for group in of_balance.filter(|group| group.log_evidence > 0.0) {
-        for name in group.over.names() {
+        for name in group.regressor.names() {
             if variables.iter().all(|known| known.variable != name) {
                 variables.push(LocatedVariable {
                     variable: name.to_owned(),
@@ -176,12 +176,12 @@ struct Term {
 }
 
 impl Term {
-    fn new(engine: &Engine<'_>, beside: &Beside<'_>) -> Option<Self> {
-        let rig = rig_of(&engine.rig, beside.effects, &beside.factors)?;
+    fn new(engine: &Engine<'_>, reference: &ReferenceModel<'_>) -> Option<Self> {
+        let rig = rig_of(&engine.rig, reference.effects, &reference.factors)?;
         let simulated = engine.simulate(&rig);
         let residual = engine.residual(&simulated);
-        let mut columns = linearise_at(engine, beside.effects, beside.factors).columns;
-        columns.extend(coordinate_columns(engine, &beside.factors, beside.effects, &simulated)?);
+        let mut columns = linearise_at(engine, reference.effects, reference.factors).columns;
+        columns.extend(coordinate_columns(engine, &reference.factors, reference.effects, &simulated)?);
         let all: Vec<&[f64]> = std::iter::once(&residual).chain(&columns).map(Vec::as_slice).collect();
         let mut windows = Vec::new();
         let mut places: Vec<(&GriddedRecord, usize)> = Vec::new();
@@ -197,8 +197,8 @@ impl Term {
         simulated_forces(engine, &simulated, &mut values);
         Some(Term {
             nuisance: engine.products(&residual, &columns),
-            precisions: prior_precisions(beside.effects),
-            offsets: prior_deviations(&beside.factors, beside.effects),
+            precisions: prior_precisions(reference.effects),
+            offsets: prior_deviations(&reference.factors, reference.effects),
             windows,
             axis_by_axis: engine.axis_by_axis,
             measured: places.first().map_or([false; 2], |(record, _)| record.measured),
@@ -209,16 +209,16 @@ impl Term {
     /// All groups, by evidence.
     fn groups(&self) -> Vec<Group> {
         let (loss, log_determinant) = self.fitted(&self.nuisance, &self.precisions);
-        let all: Vec<(usize, &'static [UnknownKind], Over)> = (0..2)
+        let all: Vec<(usize, &'static [UnknownKind], Regressor)> = (0..2)
             .filter(|axis| self.measured[*axis])
             .flat_map(|axis| BALANCES.map(|kinds| (axis, kinds)))
-            .flat_map(|(axis, kinds)| Over::all().map(move |over| (axis, kinds, over)))
+            .flat_map(|(axis, kinds)| Regressor::all().map(move |regressor| (axis, kinds, regressor)))
             .collect();
         let mut groups: Vec<Group> = all
             .into_par_iter()
-            .filter_map(|(axis, kinds, over)| {
+            .filter_map(|(axis, kinds, regressor)| {
                 // A singular fit has no evidence.
-                let products = self.with_terms(axis, kinds, over);
+                let products = self.with_terms(axis, kinds, regressor);
                 let count = products.columns - self.precisions.len();
                 let evidence = |size: f64| {
                     let precision = size.powi(-2);
@@ -231,7 +231,7 @@ impl Term {
                     let (with, with_determinant) = self.fitted(&products, &precisions);
                     let spread = -(count as f64) * precision.ln();
                     let log_evidence = -0.5 * (with - loss + spread + with_determinant - log_determinant);
-                    Group { axis, kinds, over, log_evidence, loss_reduction: loss - with }
+                    Group { axis, kinds, regressor, log_evidence, loss_reduction: loss - with }
                 };
                 SIZES
                     .into_iter()
@@ -258,18 +258,18 @@ impl Term {
     }
 
     /// For each window a row for each block, a column for each hat.
-    fn features(&self, axis: usize, kind: UnknownKind, over: Over) -> Vec<DMatrix<f64>> {
+    fn features(&self, axis: usize, kind: UnknownKind, regressor: Regressor) -> Vec<DMatrix<f64>> {
         let values = &self.values[axis][kind.place()];
-        let knots = match over {
-            Over::Constant => vec![0.0],
-            Over::Variable(at) | Over::Product([at, _]) => {
+        let knots = match regressor {
+            Regressor::Constant => vec![0.0],
+            Regressor::Variable(at) | Regressor::Product([at, _]) => {
                 knots(values.iter().flatten().map(|values| values[at]).collect())
             }
         };
-        let row = |values: &[f64; VARIABLES.len()], hat: usize| match over {
-            Over::Constant => 1.0,
-            Over::Variable(at) => hat_at(&knots, hat, values[at]),
-            Over::Product([at, times]) => hat_at(&knots, hat, values[at]) * values[times],
+        let row = |values: &[f64; VARIABLES.len()], hat: usize| match regressor {
+            Regressor::Constant => 1.0,
+            Regressor::Variable(at) => hat_at(&knots, hat, values[at]),
+            Regressor::Product([at, times]) => hat_at(&knots, hat, values[at]) * values[times],
         };
         values
             .iter()
@@ -278,9 +278,9 @@ impl Term {
     }
 
     /// The nuisance columns, then the hats of each balance.
-    fn with_terms(&self, axis: usize, kinds: &[UnknownKind], over: Over) -> Products {
+    fn with_terms(&self, axis: usize, kinds: &[UnknownKind], regressor: Regressor) -> Products {
         let hats: Vec<Vec<DMatrix<f64>>> =
-            kinds.iter().map(|kind| self.features(axis, *kind, over)).collect();
+            kinds.iter().map(|kind| self.features(axis, *kind, regressor)).collect();
         let (mut scores, mut information) = (Vec::new(), Vec::new());
         for (at, window) in self.windows.iter().enumerate() {
             // The hats of all balances as a function of all inputs of the axis.
@@ -383,14 +383,14 @@ mod tests {
     fn a_memory_comes_first_only_where_it_explains_much_more() {
         let place = |name: &str| VARIABLES.iter().position(|known| known.name == name).expect("in the table");
         let group = |name, log_evidence| {
-            let over = Over::Variable(place(name));
-            Group { axis: 0, kinds: BALANCES[0], over, log_evidence, loss_reduction: 2.0 * log_evidence }
+            let regressor = Regressor::Variable(place(name));
+            Group { axis: 0, kinds: BALANCES[0], regressor, log_evidence, loss_reduction: 2.0 * log_evidence }
         };
         let first = |memory, plain| {
             let mut groups =
                 vec![group("last movement of u", memory), group("du/dt", plain), group("x", 1.0)];
             groups.sort_by(|left, right| right.log_evidence.total_cmp(&left.log_evidence));
-            plain_first(groups)[0].over.names()[0]
+            plain_first(groups)[0].regressor.names()[0]
         };
         assert_eq!(first(1000.0, 800.0), "last movement of u");
         // Within a tenth, and within the choice among so many groups.

@@ -29,7 +29,7 @@ pub(crate) const FACTOR_CHANGE: f64 = 0.01;
 const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.6, 1.05];
 
 /// Size of the cache of sensitivities, which saves a fifth of the time of naming.
-const KEPT: usize = 4;
+const CACHE_SIZE: usize = 4;
 
 /// A rig, the factors of its parameters, and the sensitivities to them.
 type Sensitivities = (RigParameters, [f64; COUNT], Vec<Vec<f64>>);
@@ -50,7 +50,7 @@ pub struct Engine<'a> {
     /// Whether [`Engine::simulate`] takes longer steps.
     coarse: bool,
     /// Cache of sensitivities, latest last.
-    kept: Mutex<Vec<Sensitivities>>,
+    sensitivity_cache: Mutex<Vec<Sensitivities>>,
 }
 
 impl<'a> Engine<'a> {
@@ -77,7 +77,7 @@ impl<'a> Engine<'a> {
             scaled_dof,
             variance_factor: 1.0,
             coarse,
-            kept: Mutex::default(),
+            sensitivity_cache: Mutex::default(),
         };
         let residual = engine.residual(&engine.simulate(rig));
         engine.variance_factor = variance_factor(&engine.squares(&residual), &engine.scaled_dof);
@@ -132,7 +132,7 @@ impl<'a> Engine<'a> {
             scaled_dof,
             variance_factor: self.variance_factor,
             coarse: self.coarse,
-            kept: Mutex::default(),
+            sensitivity_cache: Mutex::default(),
         }
     }
 
@@ -176,8 +176,8 @@ impl<'a> Engine<'a> {
     }
 
     /// Runs of `rig` in all windows with the steps of the search, kept for [`Engine::simulate_where`].
-    pub fn pass(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
-        self.windows.par_iter().map(|windows| windows.pass(rig)).collect()
+    pub fn reference_runs(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
+        self.windows.par_iter().map(|windows| windows.reference_run(rig)).collect()
     }
 
     /// Readings of a neighbour of the reference rig: [`Windows::simulate_where`].
@@ -267,8 +267,8 @@ impl<'a> Engine<'a> {
     /// # Panics
     /// When another thread panicked here.
     pub fn parameter_columns(&self, rig: &RigParameters, factors: &[f64; COUNT]) -> Vec<Vec<f64>> {
-        let kept = || self.kept.lock().expect("nobody panics with it");
-        if let Some((.., columns)) = kept().iter().find(|(at_rig, at, _)| at_rig == rig && at == factors) {
+        let cache = || self.sensitivity_cache.lock().expect("nobody panics with it");
+        if let Some((.., columns)) = cache().iter().find(|(at_rig, at, _)| at_rig == rig && at == factors) {
             return columns.clone();
         }
         let perturbed = |at: usize, change: f64| {
@@ -282,11 +282,11 @@ impl<'a> Engine<'a> {
             .flat_map(|change| (0..COUNT).map(move |at| perturbed(at, change)))
             .collect();
         let columns = self.differences(&rigs, 2.0 * FACTOR_CHANGE);
-        let mut kept = kept();
-        if kept.len() == KEPT {
-            kept.remove(0);
+        let mut cache = cache();
+        if cache.len() == CACHE_SIZE {
+            cache.remove(0);
         }
-        kept.push((rig.clone(), *factors, columns.clone()));
+        cache.push((rig.clone(), *factors, columns.clone()));
         columns
     }
 }

@@ -35,9 +35,9 @@ use crate::engine::Engine;
 use crate::parameters::{COUNT, with_factors};
 use crate::refit::{EffectEstimate, Linearisation, Refit, coordinates, derivative, linearise, rig_of};
 use crate::report::Significance;
-use crate::screen::{Columns, Screened};
+use crate::screen::{Columns, ScreenedCandidate};
 pub use decision::NotExplained;
-use decision::{Decision, Searched, decide};
+use decision::{Decision, SearchOutcome, decide};
 use elimination::Selection;
 pub(crate) use elimination::{INDISTINGUISHABLE_LOSS_DIFFERENCE, is_same_effect};
 pub use explanations::Explanation;
@@ -52,7 +52,7 @@ use needed_parameters::with_needed;
 use null_distribution::NullDistribution;
 use plant::effects::sheet::Part;
 use rayon::prelude::*;
-use round::Round;
+use round::SelectionRound;
 use significance::Fitted;
 use start_states::{RefitWithInitialStates, refit_with_starts};
 
@@ -101,7 +101,7 @@ pub struct SelectionResult {
     /// Share of the excess that each effect removes.
     pub shares: Vec<f64>,
     /// First screening of all candidates, best first.
-    pub(crate) screened: Vec<Screened>,
+    pub(crate) screened: Vec<ScreenedCandidate>,
     /// All fits, each with its candidate as the last effect.
     pub fitted: Vec<Refit>,
     /// 99th percentile of the largest gain of any candidate under the null distribution.
@@ -155,7 +155,8 @@ pub fn name(
         let at_model = if number == 0 { linearisation.clone() } else { linearise(here, model) };
         // What is left where a model lacks fit is signal: it is no measure of what chance gains.
         let searched = if lacks_fit(here, model.loss) { 0.0 } else { threshold };
-        let selected = Round::selected(here, &at_model, &columns, model, screening, searched, progress);
+        let selected =
+            SelectionRound::selected(here, &at_model, &columns, model, screening, searched, progress);
         let Some(mut round) = selected else { break };
         fitted.extend(round.fits.iter().cloned());
         let inexact = round.fits.first().is_some_and(|best| lacks_fit(here, best.loss));
@@ -202,7 +203,7 @@ pub fn name(
     let as_fitted = fitted.iter().find(|fit| fit.loss == model.loss).unwrap_or(model);
     let fits = Fits { parameters: calibrated, model: as_fitted, fitted: &fitted };
     let explanations = explanations(here, &linearisation, &columns, &fits);
-    let searched = Searched { selection, all_rounds, lacks_fit, any_homogeneous };
+    let searched = SearchOutcome { selection, all_rounds, lacks_fit, any_homogeneous };
     let mut decision = decide(here, &explanations, searched);
     let significance = decision.to_be_named().and_then(|model| {
         progress("testing what is named against chance");
@@ -382,7 +383,7 @@ fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<
 }
 
 /// Screens all candidates against a model's residual, with the derivatives of its effects as extra columns.
-fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<Screened>) {
+fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<ScreenedCandidate>) {
     let linearisation = linearise(engine, model);
     let rig = rig_of(&engine.rig, &model.effects, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);

@@ -178,7 +178,7 @@ pub(crate) fn loss_at(engine: &Engine<'_>, linearisation: &Linearisation, effect
 }
 
 /// Effects at some coordinates, simulated, with the parameters fitted linearly.
-struct Projected {
+struct ProjectedFit {
     effects: Vec<EffectEstimate>,
     simulated: Vec<f64>,
     residual: Vec<f64>,
@@ -187,7 +187,7 @@ struct Projected {
     prior: f64,
 }
 
-impl Iterate for Projected {
+impl Iterate for ProjectedFit {
     fn loss(&self) -> f64 {
         self.fit.loss + self.prior
     }
@@ -226,7 +226,7 @@ pub(crate) fn refit_steps(
             })
             .sum()
     };
-    let mut evaluate = |effects: Vec<EffectEstimate>| -> Option<Projected> {
+    let mut evaluate = |effects: Vec<EffectEstimate>| -> Option<ProjectedFit> {
         let simulated = engine.simulate(&rig_of(&engine.rig, &effects, &linearisation.factors)?);
         let residual = engine.residual(&simulated);
         let products = match &mut parameter_products {
@@ -238,9 +238,9 @@ pub(crate) fn refit_steps(
         };
         let fit = products.fit_within(&parameters, &precisions, &off, &[MOST_OFF; COUNT]);
         let prior = prior(&effects);
-        Some(Projected { effects, simulated, residual, fit, prior })
+        Some(ProjectedFit { effects, simulated, residual, fit, prior })
     };
-    let products_at = |iterate: &Projected| -> Option<Products> {
+    let products_at = |iterate: &ProjectedFit| -> Option<Products> {
         let columns =
             coordinate_columns(engine, &linearisation.factors, &iterate.effects, &iterate.simulated)?;
         let all: Vec<&Vec<f64>> = linearisation.columns.iter().chain(&columns).collect();
@@ -296,7 +296,7 @@ pub(crate) fn refit_steps(
         *factor = (*factor + change).clamp(1.0 - MOST_OFF, 1.0 + MOST_OFF);
     }
     let loss = iterate.loss() + model_penalty(coordinates.len(), &factors);
-    let Projected { effects, fit, .. } = iterate;
+    let ProjectedFit { effects, fit, .. } = iterate;
     Some(Refit { effects, factors, loss, squares: fit.squares, errors, design_effect, convergence })
 }
 

@@ -25,7 +25,7 @@ pub struct Columns {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Screened {
+pub(crate) struct ScreenedCandidate {
     /// Index in [`Columns::candidates`].
     pub at: usize,
     /// Loss with it.
@@ -79,24 +79,24 @@ impl Columns {
         linearisation: &Linearisation,
         residual: &[f64],
         model_sensitivities: &[Vec<f64>],
-    ) -> (f64, Vec<Screened>) {
-        let all = self.beside(linearisation, model_sensitivities);
-        let beside = Beside::new(linearisation, model_sensitivities.len());
+    ) -> (f64, Vec<ScreenedCandidate>) {
+        let all = self.with_model(linearisation, model_sensitivities);
+        let joint = JointColumns::new(linearisation, model_sensitivities.len());
         let products = engine.products(residual, &all);
-        let null_loss = beside.fit(&products).loss;
+        let null_loss = joint.fit(&products).loss;
         let screened = (0..self.candidates.len())
             .into_par_iter()
             .filter_map(|at| {
-                let BestColumns { loss, coordinates, .. } = self.best_columns(&products, at, &beside)?;
+                let BestColumns { loss, coordinates, .. } = self.best_columns(&products, at, &joint)?;
                 let start = EffectEstimate { candidate: self.candidates[at], coordinates };
-                Some(Screened { at, loss, start })
+                Some(ScreenedCandidate { at, loss, start })
             })
             .collect();
         (null_loss, screened)
     }
 
     /// All columns: of the parameters, of a model, of the probes.
-    pub(crate) fn beside<'c>(
+    pub(crate) fn with_model<'c>(
         &'c self,
         linearisation: &'c Linearisation,
         model_sensitivities: &'c [Vec<f64>],
@@ -106,7 +106,7 @@ impl Columns {
     }
 
     /// Largest gain of `count` candidates that join one after the other, those before the last by their loss; `products` are of
-    /// [`Columns::beside`] without a model. `gain` is that of windows from the squares without to those with them; each column is
+    /// [`Columns::with_model`] without a model. `gain` is that of windows from the squares without to those with them; each column is
     /// charged [`COLUMN_PENALTY`].
     pub(crate) fn largest_gain(
         &self,
@@ -115,30 +115,30 @@ impl Columns {
         count: usize,
         gain: impl Fn(&[f64], &[f64]) -> f64,
     ) -> f64 {
-        let mut beside = Beside::new(linearisation, 0);
-        let null = beside.fit(products);
+        let mut joint = JointColumns::new(linearisation, 0);
+        let null = joint.fit(products);
         let mut joined: Vec<usize> = Vec::new();
         let mut largest = f64::NEG_INFINITY;
         for _ in 0..count {
             let others = (0..self.candidates.len()).filter(|at| !joined.contains(at));
             let fitted: Vec<(usize, BestColumns)> =
-                others.filter_map(|at| Some((at, self.best_columns(products, at, &beside)?))).collect();
+                others.filter_map(|at| Some((at, self.best_columns(products, at, &joint)?))).collect();
             let gains = fitted.iter().map(|(_, best)| {
-                let charged = COLUMN_PENALTY * best.columns.len() as f64 + beside.penalty;
+                let charged = COLUMN_PENALTY * best.columns.len() as f64 + joint.penalty;
                 gain(&null.squares, &best.squares) - charged
             });
             largest = gains.fold(largest, f64::max);
             let best = fitted.into_iter().min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
             let Some((at, best)) = best else { break };
             joined.push(at);
-            beside.join(&best.columns);
+            joint.join(&best.columns);
         }
         largest
     }
 
     /// The best fit of a candidate's probes, in some of their combinations.
-    fn best_columns(&self, products: &Products, at: usize, beside: &Beside) -> Option<BestColumns> {
-        let always = beside.columns.len();
+    fn best_columns(&self, products: &Products, at: usize, joint: &JointColumns) -> Option<BestColumns> {
+        let always = joint.columns.len();
         let candidate = self.candidates[at];
         // Probes of the amplitude enter one at a time; probes of further keys with a neutral value join.
         let (leading, joining): (Vec<_>, Vec<_>) =
@@ -147,10 +147,10 @@ impl Columns {
         let alone = Vec::new();
         for (probe, index) in &leading {
             for with in if joining.is_empty() { vec![&alone] } else { vec![&alone, &joining] } {
-                let mut joined = beside.clone();
+                let mut joined = joint.clone();
                 let columns: Vec<usize> = std::iter::once(index)
                     .chain(with.iter().map(|(_, index)| index))
-                    .map(|index| beside.first_probe + index)
+                    .map(|index| joint.first_probe + index)
                     .collect();
                 joined.join(&columns);
                 let fit = joined.fit(products);
@@ -190,9 +190,9 @@ struct BestColumns {
     squares: Vec<f64>,
 }
 
-/// Columns that are fitted together, with what holds their coefficients.
+/// Columns that are fitted jointly, with the priors of their coefficients.
 #[derive(Clone)]
-struct Beside {
+struct JointColumns {
     columns: Vec<usize>,
     precisions: Vec<f64>,
     prior_offset: Vec<f64>,
@@ -202,14 +202,20 @@ struct Beside {
     first_probe: usize,
 }
 
-impl Beside {
+impl JointColumns {
     /// The parameters, and the first columns after them, which are a model's.
     fn new(linearisation: &Linearisation, of_model: usize) -> Self {
         let always = COUNT + of_model;
         let (mut precisions, mut prior_offset) = (parameter_precisions(), linearisation.deviations());
         precisions.resize(always, COLUMN_PRECISION);
         prior_offset.resize(always, 0.0);
-        Beside { columns: (0..always).collect(), precisions, prior_offset, penalty: 0.0, first_probe: always }
+        JointColumns {
+            columns: (0..always).collect(),
+            precisions,
+            prior_offset,
+            penalty: 0.0,
+            first_probe: always,
+        }
     }
 
     fn join(&mut self, columns: &[usize]) {

@@ -15,14 +15,14 @@ use plant::effects::sheet::{Element, Part, SensorError};
 use plant::{Axis, PERIOD_S, RigParameters};
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Reading {
+struct SensorModel {
     delay_s: f64,
     gain: f64,
     offset: f64,
 }
 
-impl Reading {
-    const TRUE: Reading = Reading { delay_s: 0.0, gain: 1.0, offset: 0.0 };
+impl SensorModel {
+    const TRUE: SensorModel = SensorModel { delay_s: 0.0, gain: 1.0, offset: 0.0 };
 
     fn undo(self, value: f64) -> f64 {
         (value - self.offset) / self.gain
@@ -32,7 +32,7 @@ impl Reading {
 /// Inverse of the position and pressure sensors of each axis.
 #[derive(Clone, Debug)]
 pub(crate) struct SensorInverse {
-    axes: [[Reading; 3]; 2],
+    axes: [[SensorModel; 3]; 2],
     /// Terms of readings that the rig declares.
     declared: Vec<Declared>,
     stroke_m: f64,
@@ -42,7 +42,7 @@ pub(crate) struct SensorInverse {
 impl SensorInverse {
     /// Takes the sensor models from the effects of a rig.
     pub(crate) fn of(rig: &RigParameters) -> Self {
-        let mut axes = [[Reading::TRUE; 3]; 2];
+        let mut axes = [[SensorModel::TRUE; 3]; 2];
         for effect in rig.effects() {
             let sheet = sheet(effect.name).expect("an effect that is on has a sheet");
             let Some((error, sensor)) = sheet.sensor_error else { continue };
@@ -64,7 +64,8 @@ impl SensorInverse {
         let of_readings = [Target::Position, Target::PressureA, Target::PressureB];
         let declared: Vec<Declared> =
             rig.terms().iter().filter(|term| of_readings.contains(&term.target)).cloned().collect();
-        let is_true = declared.is_empty() && axes.iter().flatten().all(|reading| *reading == Reading::TRUE);
+        let is_true =
+            declared.is_empty() && axes.iter().flatten().all(|reading| *reading == SensorModel::TRUE);
         SensorInverse { axes, declared, stroke_m: rig.cylinder().stroke_m, is_true }
     }
 
@@ -82,7 +83,7 @@ impl SensorInverse {
         for axis in Axis::ALL {
             let i = axis.index();
             let [position, a, b] = self.axes[i];
-            let later = |reading: Reading, of: &dyn Fn(&AxisState) -> f64| {
+            let later = |reading: SensorModel, of: &dyn Fn(&AxisState) -> f64| {
                 let (then, now) =
                     (at(record, i, period, reading.delay_s, of), of(&record.smoothed_states[period][i]));
                 of(&starts[i]) + then - now

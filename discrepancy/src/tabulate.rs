@@ -35,7 +35,7 @@ const TRIED: usize = 3;
 const KNOTS: usize = 8;
 const DIRECTED_KNOTS: usize = 32;
 /// Refinement factors.
-const FINER: [usize; 2] = [2, 4];
+const REFINEMENTS: [usize; 2] = [2, 4];
 /// Maximum number of points of a table.
 const MAX_KNOTS: usize = tabulated::POINTS[1];
 /// Steps of a first fit, and of a final one.
@@ -77,7 +77,7 @@ pub(crate) fn tabulate(
 
     progress("a table for what is missing");
     let (first, used) = search.best(&parameters_alone, None).ok_or("no rig can have its curve")?;
-    let mut best = search.finer(first);
+    let mut best = search.refined(first);
     progress("a table over a second variable");
     if let Some((second, _)) = search.best(&best, Some(used))
         && best.loss - second.loss > LEAST_SHARE_OF_SECOND * best.loss.abs()
@@ -277,9 +277,9 @@ impl TableSearch<'_> {
     }
 
     /// Refines the table while the loss, penalty included, falls.
-    fn finer(&self, start: Iterate) -> Iterate {
+    fn refined(&self, start: Iterate) -> Iterate {
         let mut best = fit::fit(self.engine, start, STEPS);
-        for times in FINER {
+        for times in REFINEMENTS {
             let mut model = best.model.clone();
             for fitted in model.tables.iter_mut().filter(|fitted| fitted.table.at.len() > 2) {
                 let is_directed = fitted.table.variable == Variable::DirectedExtension;

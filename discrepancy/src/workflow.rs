@@ -12,7 +12,7 @@ mod findings;
 mod proposal;
 
 use crate::check::{Checked, check};
-use crate::discrepancy_term::{Beside, located_term};
+use crate::discrepancy_term::{ReferenceModel, located_term};
 use crate::engine::Engine;
 use crate::extend::{Addition, ExtendError, add_tables, add_terms, extend};
 use crate::gridded_record::{GriddedRecord, searched_share};
@@ -118,7 +118,7 @@ impl RigFile {
 
 /// A checked record, gridded when it can be used.
 #[derive(Debug)]
-pub struct Opened {
+pub struct CheckedRecord {
     pub checked: Checked,
     /// The gridded record; `None` when it cannot be used.
     pub gridded: Option<GriddedRecord>,
@@ -128,11 +128,11 @@ pub struct Opened {
 ///
 /// # Errors
 /// [`WorkflowError`] when it cannot be read.
-pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<Opened, WorkflowError> {
+pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<CheckedRecord, WorkflowError> {
     let record = records::read(path, options)?;
     let mut checked = check(&record, rig);
     if !checked.report.usable {
-        return Ok(Opened { checked, gridded: None });
+        return Ok(CheckedRecord { checked, gridded: None });
     }
     let gridded = match GriddedRecord::of(&record, &checked, rig) {
         Ok(gridded) => Some(gridded),
@@ -141,7 +141,7 @@ pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<O
             None
         }
     };
-    Ok(Opened { checked, gridded })
+    Ok(CheckedRecord { checked, gridded })
 }
 
 /// Checks the records, selects effects, locates what is left, extends the rig file, then judges on the held-out record.
@@ -210,10 +210,10 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
     if report.adequate == Some(false)
         && let Some(model) = remaining_beside(&report, &found)
     {
-        let beside = Beside { effects: &model.effects, factors: model.factors };
+        let reference = ReferenceModel { effects: &model.effects, factors: model.factors };
         let rig = rig_of(rig, &model.effects, &model.factors);
         let unknowns = rig.filter(|_| linked).map(|rig| locate(&rig, &records, progress).unknowns);
-        report.remaining = term_beside(&engine, &beside, &unknowns.unwrap_or_default(), progress);
+        report.remaining = term_beside(&engine, &reference, &unknowns.unwrap_or_default(), progress);
     }
     let mut experiment = None;
     if report.verdict == Verdict::Ambiguous
@@ -249,14 +249,14 @@ pub(crate) fn term_of_rig_file(
     unknowns: &[UnknownSeries],
     progress: &mut dyn FnMut(&str),
 ) -> Option<LocatedTerm> {
-    term_beside(engine, &Beside { effects: &[], factors: [1.0; COUNT] }, unknowns, progress)
+    term_beside(engine, &ReferenceModel { effects: &[], factors: [1.0; COUNT] }, unknowns, progress)
 }
 
 /// Which balance disagrees beside a model, and on what it depends. The contact of linked rods is no input of an axis: the unknown
 /// inputs of short windows show it.
 fn term_beside(
     engine: &Engine<'_>,
-    beside: &Beside<'_>,
+    reference: &ReferenceModel<'_>,
     unknowns: &[UnknownSeries],
     progress: &mut dyn FnMut(&str),
 ) -> Option<LocatedTerm> {
@@ -267,7 +267,7 @@ fn term_beside(
         return Some(LocatedTerm::from(outside));
     }
     progress("what the disagreement depends on");
-    located_term(engine, beside)
+    located_term(engine, reference)
 }
 
 /// Subsamples each record.
@@ -351,7 +351,7 @@ fn open_all(
     task: &Task,
     rig: &RigParameters,
     progress: &mut dyn FnMut(&str),
-) -> Result<Vec<Opened>, WorkflowError> {
+) -> Result<Vec<CheckedRecord>, WorkflowError> {
     task.train
         .iter()
         .map(|path| {

@@ -1,7 +1,7 @@
 //! A record tells the numbers of a rig that nothing is missing from: its volumes and the points of its valve's tables too.
 
 use crate::record::gridded;
-use discrepancy::calibrate::finer::{Finer, finer};
+use discrepancy::calibrate::finer::{TableCalibration, calibrate_tables};
 use discrepancy::calibrate::{calibrate, quantity};
 use discrepancy::engine::Engine;
 use discrepancy::extend::extend;
@@ -11,8 +11,8 @@ use plant::{Axis, RigParameters};
 
 const KV_SUPPLY: [f64; 6] = [0.0, 0.0, 0.123, 0.36, 0.57, 0.66];
 
-fn found(engine: &Engine<'_>) -> Finer {
-    finer(engine, &calibrate(engine, &Linearisation::at_baseline(engine))).expect("a rig")
+fn found(engine: &Engine<'_>) -> TableCalibration {
+    calibrate_tables(engine, &calibrate(engine, &Linearisation::at_baseline(engine))).expect("a rig")
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! Claims about unknown inputs, on records that the plant makes here: each effect lifts its own balance and shows its variable.
 
 use crate::record::{Hidden, gridded, hiding};
-use discrepancy::discrepancy_term::{Beside, located_term};
+use discrepancy::discrepancy_term::{ReferenceModel, located_term};
 use discrepancy::engine::Engine;
 use discrepancy::locate::{Located, locate};
 use discrepancy::outside::outside;
@@ -92,7 +92,7 @@ fn term(effects: &[Hidden<'_>]) -> Option<(String, Vec<String>)> {
     let rig = RigParameters::baseline();
     let records = [gridded(&hiding(effects), &rig)];
     let engine = Engine::new(&records, &rig);
-    let term = located_term(&engine, &Beside { effects: &[], factors: [1.0; 9] })?;
+    let term = located_term(&engine, &ReferenceModel { effects: &[], factors: [1.0; 9] })?;
     Some((term.balance, term.variables.into_iter().take(2).map(|variable| variable.variable).collect()))
 }
 

@@ -27,7 +27,7 @@ fn a_point_of_a_table_changes_nothing_in_windows_that_do_not_reach_it() {
     let baseline = RigParameters::baseline();
     let gridded = gridded(&baseline, &baseline);
     let windows = Windows::new(&gridded, &baseline);
-    let passage = windows.pass(&rig(0, 0.0));
+    let passage = windows.reference_run(&rig(0, 0.0));
     assert_eq!(passage.simulated, windows.simulate_coarsely(&rig(0, 0.0)));
 
     let mut skipped = 0;
@@ -61,7 +61,7 @@ fn what_remembers_is_simulated_everywhere() {
             .with_effect("valve-hysteresis", "drive", &[("half_width_percent", 1.0)])
             .expect("numbers of the sheet")
     };
-    let passage = windows.pass(&plays(2, 0.0));
+    let passage = windows.reference_run(&plays(2, 0.0));
     let everywhere = windows.simulate_coarsely(&plays(2, 1.0));
     assert_eq!(windows.simulate_where(&plays(2, 1.0), &passage, |_| false), everywhere);
 }

@@ -20,7 +20,7 @@ use plant::RigParameters;
 use plant::parameters::table::KEYS;
 
 /// Keys with the prior standard deviation of their factors.
-const FINER: [(&str, f64); 3] = [
+const CALIBRATED_KEYS: [(&str, f64); 3] = [
     ("cylinder.dead_volume_cm3", 0.3),
     ("valve.kv_supply_m3_per_h", 0.05),
     ("valve.kv_exhaust_m3_per_h", 0.05),
@@ -56,9 +56,9 @@ impl Iterate for Linearised {
     }
 }
 
-/// Result for every entry.
+/// Calibrated parameters and table entries.
 #[derive(Clone, Debug)]
-pub struct Finer {
+pub struct TableCalibration {
     /// Parameters, then entries, for display.
     pub quantities: Vec<Quantity>,
     /// The same for the rig file: points of tables multiplied by their common factor.
@@ -66,7 +66,7 @@ pub struct Finer {
 }
 
 /// Fits entries and parameters jointly; `None` where no rig can have the result.
-pub fn finer(engine: &Engine<'_>, calibrated: &Refit) -> Option<Finer> {
+pub fn calibrate_tables(engine: &Engine<'_>, calibrated: &Refit) -> Option<TableCalibration> {
     let rig = &engine.rig;
     let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
     let entries = entries(rig, &calibrated.factors);
@@ -138,7 +138,7 @@ pub fn finer(engine: &Engine<'_>, calibrated: &Refit) -> Option<Finer> {
         }
         quantities.push(quantity);
     }
-    Some(Finer { quantities, changed })
+    Some(TableCalibration { quantities, changed })
 }
 
 /// Entries that are not 0 and can change either way. Points without flow belong to the dead zone; equal points of a table cannot
@@ -158,7 +158,7 @@ fn entries(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<TableEntry> {
             prior_std,
         })
     };
-    FINER.into_iter().flat_map(of_key).filter(has_neighbours).collect()
+    CALIBRATED_KEYS.into_iter().flat_map(of_key).filter(has_neighbours).collect()
 }
 
 /// The rig with all factors; `None` where one leaves its range or a table is not monotonic.
@@ -166,7 +166,7 @@ fn with(rig: &RigParameters, entries: &[TableEntry], factors: &[f64]) -> Option<
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
     let rig = with_factors(rig, &parameter_factors);
-    let lists: Vec<(&str, Vec<f64>)> = FINER
+    let lists: Vec<(&str, Vec<f64>)> = CALIBRATED_KEYS
         .iter()
         .map(|(key, _)| {
             let mut list = rig.numbers(key).to_vec();

@@ -35,7 +35,7 @@ const FORCES: [(&str, f64); 4] = [("kN", 1e3), ("mN", 1e-3), ("kgf", 9.80665), (
 
 /// A reading of an axis' columns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Reading {
+enum ColumnReading {
     AsIs,
     Swapped,
     ValveSign,
@@ -69,10 +69,10 @@ fn axis_signs(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis) {
         let (flow, forces) = (flows(&motion, rig, grid.period_s), forces(&motion, rig, axis, grid.period_s));
         (motion, flow, forces)
     };
-    let (as_is, flow, force) = fits(Reading::AsIs);
+    let (as_is, flow, force) = fits(ColumnReading::AsIs);
     let (Some(flow), Some(force)) = (flow, force) else { return };
     let unswapped = flow.correlation() + force.correlation();
-    let best = [Reading::Swapped, Reading::ValveSign, Reading::PositionSign]
+    let best = [ColumnReading::Swapped, ColumnReading::ValveSign, ColumnReading::PositionSign]
         .into_iter()
         .filter_map(|reading| {
             let (_, flow, force) = fits(reading);
@@ -91,14 +91,20 @@ fn axis_signs(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis) {
     force_sign(notes, rig, grid, axis, &as_is);
 }
 
-fn add_finding(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usize>, balances: [f64; 2]) {
+fn add_finding(
+    notes: &mut Notes,
+    axis: Axis,
+    reading: ColumnReading,
+    row: Option<usize>,
+    balances: [f64; 2],
+) {
     let (kind, signal, text) = match reading {
-        Reading::Swapped => (
+        ColumnReading::Swapped => (
             "swapped-pressures",
             Signal::PressureA,
             "pressures a and b are swapped: change the two columns (or the two hoses)",
         ),
-        Reading::ValveSign => {
+        ColumnReading::ValveSign => {
             ("valve-sign", Signal::Valve, "the command has the wrong sign: positive extends the rod")
         }
         _ => (
@@ -114,13 +120,13 @@ fn add_finding(notes: &mut Notes, axis: Axis, reading: Reading, row: Option<usiz
     notes.add(kind, Channel::Of(axis, signal), row, true, &text);
 }
 
-fn motion(notes: &Notes, rig: &RigParameters, grid: &Grid, axis: Axis, reading: Reading) -> Motion {
+fn motion(notes: &Notes, rig: &RigParameters, grid: &Grid, axis: Axis, reading: ColumnReading) -> Motion {
     let series = |signal| grid.series(notes, Channel::Of(axis, signal));
     let stroke = rig.cylinder().stroke_m;
-    let sign = if reading == Reading::ValveSign { -1.0 } else { 1.0 };
+    let sign = if reading == ColumnReading::ValveSign { -1.0 } else { 1.0 };
     let opening = held(&series(Signal::Valve), sign);
     let mut position = series(Signal::Position);
-    if reading == Reading::PositionSign {
+    if reading == ColumnReading::PositionSign {
         let negative = position.iter().flatten().filter(|value| **value < 0.0).count() * 2 > position.len();
         let whole = if negative { 0.0 } else { stroke };
         position.iter_mut().flatten().for_each(|value| *value = whole - *value);
@@ -130,7 +136,7 @@ fn motion(notes: &Notes, rig: &RigParameters, grid: &Grid, axis: Axis, reading: 
         position.iter_mut().flatten().for_each(|value| *value = stroke - (*value - offset));
     }
     let mut pressures_pa = [series(Signal::PressureA), series(Signal::PressureB)];
-    if reading == Reading::Swapped {
+    if reading == ColumnReading::Swapped {
         pressures_pa.swap(0, 1);
     }
     let force_n = means(&series(Signal::Force), REACH);

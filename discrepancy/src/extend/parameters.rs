@@ -82,7 +82,7 @@ pub(super) fn change(
         Document::parse(text).map_err(|error| layout("changed parameters", error.message().to_owned()))?;
     let mut edits = Edits::new(text);
     let mut done: Vec<&str> = Vec::new();
-    let number_of = |path: &str| match spots(&document, path)?.values.as_slice() {
+    let number_of = |path: &str| match entry_spans(&document, path)?.values.as_slice() {
         [only] => number(text, only),
         _ => None,
     };
@@ -101,11 +101,11 @@ pub(super) fn change(
                 return Err(ExtendError::Twice { what: quantity.name.clone() });
             }
             done.push(&quantity.name);
-            let Some(spots) = spots(&document, path) else { continue };
-            let Some(span) = spots.values.get(place) else { continue };
+            let Some(spans) = entry_spans(&document, path) else { continue };
+            let Some(span) = spans.values.get(place) else { continue };
             let new = quantity_text(quantity.value, quantity.standard_error, &quantity.unit);
             edits.comment_above(
-                spots.key.start,
+                spans.key.start,
                 &format!("was {}; {new}, by {}{from}", &text[span.clone()], quantity.name),
             );
             edits.replace(span.clone(), written(quantity.value));
@@ -117,7 +117,7 @@ pub(super) fn change(
                 return Err(ExtendError::Twice { what: path.to_owned() });
             }
             done.push(path);
-            let Some(spots) = spots(&document, path) else { continue };
+            let Some(spans) = entry_spans(&document, path) else { continue };
             let is_value = at == 0 && !quantity.unit.is_empty();
             let unit = if is_value { quantity.unit.as_str() } else { "" };
             let new = if is_value {
@@ -127,9 +127,9 @@ pub(super) fn change(
                     quantity.standard_error.map(|error| error * factor.unwrap_or(1.0) / quantity.value);
                 format!("times {}", quantity_text(factor.unwrap_or(1.0), error, ""))
             };
-            let comment = format!("was {}; {new}, by {}{from}", spots.written(text), quantity.name);
-            edits.comment_above(spots.key.start, &comment);
-            for span in &spots.values {
+            let comment = format!("was {}; {new}, by {}{from}", spans.written(text), quantity.name);
+            edits.comment_above(spans.key.start, &comment);
+            for span in &spans.values {
                 let Some(old) = number(text, span) else { continue };
                 let new = if is_value { quantity.value } else { old * factor.unwrap_or(1.0) };
                 edits.replace(span.clone(), written(new));
@@ -152,9 +152,10 @@ fn hold_at_rest(
         let quantity = changed.iter().find(|quantity| quantity.name == name)?;
         Some(if quantity.unit.is_empty() { old_n * quantity.value } else { quantity.value })
     };
-    let (Some(sliding), Some(rest)) =
-        (spots(document, "friction.sliding_force_n"), spots(document, "friction.break_away_force_n"))
-    else {
+    let (Some(sliding), Some(rest)) = (
+        entry_spans(document, "friction.sliding_force_n"),
+        entry_spans(document, "friction.break_away_force_n"),
+    ) else {
         return;
     };
     let (Some(old_sliding_n), Some(old_rest_n)) =
@@ -170,14 +171,14 @@ fn hold_at_rest(
     }
 }
 
-/// Where a key of the rig file and its numbers stand.
-struct Spots {
+/// Byte ranges of a key of the rig file and of its numbers.
+struct EntrySpans {
     key: Range<usize>,
     values: Vec<Range<usize>>,
     is_array: bool,
 }
 
-impl Spots {
+impl EntrySpans {
     /// The value on one line, without the comments that an array may hold.
     fn written(&self, text: &str) -> String {
         let numbers: Vec<&str> = self.values.iter().map(|span| &text[span.clone()]).collect();
@@ -185,8 +186,8 @@ impl Spots {
     }
 }
 
-/// Where `table.key` stands; `None` when it is no number or array of them, which the reader of rig files has refused.
-fn spots(document: &Document<&str>, path: &str) -> Option<Spots> {
+/// Byte ranges of `table.key`; `None` when it is no number or array of them, which the reader of rig files has refused.
+fn entry_spans(document: &Document<&str>, path: &str) -> Option<EntrySpans> {
     let (table, name) = path.split_once('.')?;
     let table = document.get(table)?.as_table_like()?;
     let key = table.key(name)?.span()?;
@@ -196,7 +197,7 @@ fn spots(document: &Document<&str>, path: &str) -> Option<Spots> {
         Some(array) => array.iter().map(|value| value.span()).collect::<Option<Vec<_>>>()?,
         None => vec![Item::span(item)?],
     };
-    (!values.is_empty()).then_some(Spots { key, values, is_array: array.is_some() })
+    (!values.is_empty()).then_some(EntrySpans { key, values, is_array: array.is_some() })
 }
 
 fn number(text: &str, span: &Range<usize>) -> Option<f64> {

@@ -60,24 +60,25 @@ pub(crate) struct InputGrams {
 }
 
 /// The inputs of some covariance, integrated out.
-pub(crate) struct Integrated {
+pub(crate) struct IntegratedInputs {
     pub(crate) covariance: Covariance,
     /// ln |1 + size^2 B C B'|, all windows.
     pub(crate) log_determinant: f64,
-    /// By how much the products of two columns fall in each window.
-    taken: Vec<DMatrix<f64>>,
+    /// Reduction of the products of two columns in each window.
+    reductions: Vec<DMatrix<f64>>,
 }
 
 impl InputGrams {
     /// Integrates the inputs out for each size of one memory; a size is left out where rounding leaves no positive matrix.
-    pub(crate) fn integrated(&self, memory_blocks: f64, sizes: &[f64]) -> Vec<Integrated> {
+    pub(crate) fn integrated(&self, memory_blocks: f64, sizes: &[f64]) -> Vec<IntegratedInputs> {
         let root = self.root(memory_blocks);
         let transformed: Vec<(DMatrix<f64>, DMatrix<f64>)> = (self.gram.iter().zip(&self.cross))
             .map(|(gram, cross)| (root.transpose() * gram * &root, root.transpose() * cross))
             .collect();
         let of_size = |size: f64| {
             let covariance = Covariance { size, memory_blocks };
-            let mut integrated = Integrated { covariance, log_determinant: 0.0, taken: Vec::new() };
+            let mut integrated =
+                IntegratedInputs { covariance, log_determinant: 0.0, reductions: Vec::new() };
             for (gram, cross) in &transformed {
                 let mut matrix = gram * size.powi(2);
                 matrix.fill_lower_triangle_with_upper_triangle();
@@ -85,7 +86,7 @@ impl InputGrams {
                 let factor = matrix.cholesky()?;
                 integrated.log_determinant += log_determinant(&factor);
                 let whitened = factor.l_dirty().solve_lower_triangular(&(cross * size))?;
-                integrated.taken.push(whitened.transpose() * &whitened);
+                integrated.reductions.push(whitened.transpose() * &whitened);
             }
             Some(integrated)
         };
@@ -107,11 +108,11 @@ impl InputGrams {
     }
 }
 
-impl Integrated {
+impl IntegratedInputs {
     /// Without a term.
     pub(crate) fn none(windows: usize) -> Self {
         let covariance = Covariance { size: 0.0, memory_blocks: 0.0 };
-        Integrated { covariance, log_determinant: 0.0, taken: vec![DMatrix::zeros(0, 0); windows] }
+        IntegratedInputs { covariance, log_determinant: 0.0, reductions: vec![DMatrix::zeros(0, 0); windows] }
     }
 
     /// Products of a model with the inputs integrated out; `residual` and `columns` are their places in [`InputGrams::cross`].
@@ -119,12 +120,14 @@ impl Integrated {
         let mut reduced = plain.clone();
         let mut information = plain.information.to_vec();
         let count = plain.columns;
-        for (window, taken) in self.taken.iter().enumerate().filter(|(_, taken)| !taken.is_empty()) {
-            reduced.squares[window] = (reduced.squares[window] - taken[(residual, residual)]).max(0.0);
+        for (window, reduction) in
+            self.reductions.iter().enumerate().filter(|(_, reduction)| !reduction.is_empty())
+        {
+            reduced.squares[window] = (reduced.squares[window] - reduction[(residual, residual)]).max(0.0);
             for (row, at) in columns.iter().enumerate() {
-                reduced.scores[window][row] -= taken[(residual, *at)];
+                reduced.scores[window][row] -= reduction[(residual, *at)];
                 for (column, other) in columns.iter().enumerate() {
-                    information[window][row * count + column] -= taken[(*at, *other)];
+                    information[window][row * count + column] -= reduction[(*at, *other)];
                 }
             }
         }
@@ -190,7 +193,7 @@ pub(crate) fn log_marginal_likelihood(
         let weights = reduced.weights(&squares);
         let [with, without] = [reduced, plain].map(|products| {
             let (matrix, vector) = products.normal(&all, &weights, &no_prior);
-            Parts::of(matrix * power, vector * power, parameters, &flat, &deviations)
+            PartitionedNormal::of(matrix * power, vector * power, parameters, &flat, &deviations)
         });
         let (with, without) = (with?, without?);
         let z = &start + step.rows(parameters, coordinates);
@@ -238,7 +241,7 @@ pub(crate) fn log_marginal_likelihood(
 }
 
 /// Normal equations, cut at the parameters.
-struct Parts {
+struct PartitionedNormal {
     matrix: DMatrix<f64>,
     factor: Cholesky<f64, Dyn>,
     between: DMatrix<f64>,
@@ -247,7 +250,7 @@ struct Parts {
     further: DVector<f64>,
 }
 
-impl Parts {
+impl PartitionedNormal {
     fn of(
         normal: DMatrix<f64>,
         vector: DVector<f64>,
@@ -258,7 +261,7 @@ impl Parts {
         let further = normal.nrows() - parameters;
         let matrix =
             normal.view((0, 0), (parameters, parameters)).into_owned() + DMatrix::from_diagonal(flat);
-        Some(Parts {
+        Some(PartitionedNormal {
             factor: Cholesky::new(matrix.clone())?,
             matrix,
             between: normal.view((0, parameters), (parameters, further)).into_owned(),
@@ -301,14 +304,14 @@ mod tests {
     const STARTS: [f64; 2] = [0.4, 0.1];
 
     /// One window: residual, two parameters, two coordinates, inputs of two kinds in three blocks each.
-    struct Made {
+    struct SyntheticWindow {
         residual: DVector<f64>,
         columns: DMatrix<f64>,
         inputs: DMatrix<f64>,
         dof: f64,
     }
 
-    impl Made {
+    impl SyntheticWindow {
         fn new(size: f64) -> Self {
             let mut random = Pcg64::seed_from_u64(3);
             let mut normal = || {
@@ -321,7 +324,7 @@ mod tests {
             let weights = DVector::from_fn(6, |_, _| size * normal());
             let residual =
                 noise + &inputs * weights + &columns * DVector::from_vec(vec![0.2, -0.4, 0.5, -0.3]);
-            Made { residual, columns, inputs, dof: ROWS as f64 }
+            SyntheticWindow { residual, columns, inputs, dof: ROWS as f64 }
         }
 
         fn products(&self, residual: &DVector<f64>, columns: &[usize]) -> Products {
@@ -331,7 +334,7 @@ mod tests {
         }
 
         /// The term integrated out; the residual comes first.
-        fn integrated(&self, residuals: &[DVector<f64>]) -> Integrated {
+        fn integrated(&self, residuals: &[DVector<f64>]) -> IntegratedInputs {
             let mut all: Vec<DVector<f64>> = residuals.to_vec();
             all.extend(self.columns.column_iter().map(Into::into));
             let grams = InputGrams {
@@ -422,31 +425,31 @@ mod tests {
 
     #[test]
     fn laplace_and_quadrature_agree_with_the_closed_form() {
-        let mut made = Made::new(TERM.size);
-        let expected = made.closed_form(0.8);
-        let laplace = made.by_laplace(prior(0.8, NORMAL));
+        let mut window = SyntheticWindow::new(TERM.size);
+        let expected = window.closed_form(0.8);
+        let laplace = window.by_laplace(prior(0.8, NORMAL));
         // The ridge of undetermined parameters is 1e-3 of a prior that is 1e-2 of the information.
         assert!((laplace - expected).abs() < 1e-2, "{laplace} {expected}");
-        let quadrature = made.by_quadrature(prior(0.8, NORMAL), [-0.2, 1.2]);
+        let quadrature = window.by_quadrature(prior(0.8, NORMAL), [-0.2, 1.2]);
         assert!((quadrature - expected).abs() < 5e-2, "{quadrature} {expected}");
         // Half of the mode is cut away.
-        let halved = made.by_quadrature(prior(0.8, NORMAL), [-0.2, 0.5]);
+        let halved = window.by_quadrature(prior(0.8, NORMAL), [-0.2, 0.5]);
         assert!(halved < expected - 0.2, "{halved} {expected}");
     }
 
     #[test]
     fn a_prior_three_times_as_wide_costs_ln_3_for_each_amplitude() {
-        let mut made = Made::new(TERM.size);
-        made.closed_form(0.8);
-        let [narrow, wide] = [5.0, 15.0].map(|scale| made.by_laplace(prior(scale, 1.0)));
+        let mut window = SyntheticWindow::new(TERM.size);
+        window.closed_form(0.8);
+        let [narrow, wide] = [5.0, 15.0].map(|scale| window.by_laplace(prior(scale, 1.0)));
         assert!((narrow - wide - 2.0 * 3.0_f64.ln()).abs() < 0.05, "{narrow} {wide}");
     }
 
     #[test]
     fn without_a_term_nothing_is_taken() {
-        let made = Made::new(0.0);
-        let plain = made.products(&made.residual, &[0, 1, 2, 3]);
-        let reduced = Integrated::none(1).products(&plain, 0, &[1, 2, 3, 4]);
+        let window = SyntheticWindow::new(0.0);
+        let plain = window.products(&window.residual, &[0, 1, 2, 3]);
+        let reduced = IntegratedInputs::none(1).products(&plain, 0, &[1, 2, 3, 4]);
         assert_eq!(plain.squares, reduced.squares);
     }
 

@@ -21,7 +21,7 @@
 
 use super::noise_colour::ar1_coefficients;
 use super::regime::Regimes;
-use super::simulated::{Nudge, Pass, Readings};
+use super::simulated::{Perturbation, Readings, RecordFollower};
 use super::{UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
 use crate::gridded_record::memory::Memory;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
@@ -30,9 +30,9 @@ use crate::windows::{FORCE, UnknownKind};
 use nalgebra::{SMatrix, SVector};
 use plant::{Axis, PERIOD_S, RigParameters};
 
-/// What is estimated of a window and axis: start state and unknown inputs. The place of a number is its index in vectors.
+/// Unknowns of a window and axis: start state and unknown inputs. The place of one is its index in vectors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Number {
+enum WindowUnknown {
     Extension,
     Velocity,
     PressureA,
@@ -49,18 +49,18 @@ enum Number {
 const FORCE_STEP_N: f64 = 1.0;
 /// Of each number the standard deviation of its weak prior and the step of its finite differences, in m, m/s, Pa, N, m^3/s. The
 /// sensitivity to the offset is known. Priors are a guess: some ten times the errors of points and the size of effects.
-const NUMBERS: [(Number, f64, Option<f64>); COUNT] = [
-    (Number::Extension, 1e-4, Some(1e-5)),
-    (Number::Velocity, 2e-2, Some(5e-4)),
-    (Number::PressureA, 5e3, Some(200.0)),
-    (Number::PressureB, 5e3, Some(200.0)),
-    (Number::Force, 300.0, Some(FORCE_STEP_N)),
-    (Number::Ramp, 300.0, Some(1.0)),
-    (Number::FlowA, 2e-3, Some(3e-5)),
-    (Number::FlowB, 2e-3, Some(3e-5)),
-    (Number::Offset, 100.0, None),
+const NUMBERS: [(WindowUnknown, f64, Option<f64>); COUNT] = [
+    (WindowUnknown::Extension, 1e-4, Some(1e-5)),
+    (WindowUnknown::Velocity, 2e-2, Some(5e-4)),
+    (WindowUnknown::PressureA, 5e3, Some(200.0)),
+    (WindowUnknown::PressureB, 5e3, Some(200.0)),
+    (WindowUnknown::Force, 300.0, Some(FORCE_STEP_N)),
+    (WindowUnknown::Ramp, 300.0, Some(1.0)),
+    (WindowUnknown::FlowA, 2e-3, Some(3e-5)),
+    (WindowUnknown::FlowB, 2e-3, Some(3e-5)),
+    (WindowUnknown::Offset, 100.0, None),
 ];
-const COUNT: usize = Number::Offset as usize + 1;
+const COUNT: usize = WindowUnknown::Offset as usize + 1;
 const _: () = {
     let mut at = 0;
     while at < COUNT {
@@ -69,7 +69,7 @@ const _: () = {
     }
 };
 
-impl Number {
+impl WindowUnknown {
     fn of(self, theta: &Theta) -> f64 {
         theta[self as usize]
     }
@@ -80,7 +80,7 @@ impl Number {
 
     /// Whether it is 0 under the null.
     fn is_unknown_input(self) -> bool {
-        self as usize >= Number::Force as usize
+        self as usize >= WindowUnknown::Force as usize
     }
 }
 
@@ -127,7 +127,7 @@ impl Unknowns {
 }
 
 /// A window and axis, solved.
-struct Solved {
+struct SolvedWindow {
     from: usize,
     /// Whether the response to a force is antisymmetric.
     smooth: bool,
@@ -148,11 +148,11 @@ struct Solution {
 
 /// Estimates the unknown inputs of a record and appends them.
 pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &mut Unknowns) {
-    let Some(mut pass) = Pass::new(rig, gridded) else { return };
+    let Some(mut follower) = RecordFollower::new(rig, gridded) else { return };
     let axes: Vec<usize> = (0..2).filter(|axis| gridded.measured[*axis]).collect();
     let ar1_coefficients = [0, 1]
         .map(|axis| if gridded.measured[axis] { ar1_coefficients(gridded, axis) } else { [0.0; CHANNELS] });
-    let mut solved: [Vec<Solved>; 2] = [Vec::new(), Vec::new()];
+    let mut solved: [Vec<SolvedWindow>; 2] = [Vec::new(), Vec::new()];
     let mut filled = 0;
     // The last window needs one more period.
     for window in 0..(gridded.len() - 1) / WINDOW {
@@ -160,7 +160,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
         let whole = !gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap);
         filled = if whole { filled + 1 } else { 0 };
         if filled > FILLING
-            && let Some(runs) = Runs::of(&pass, from)
+            && let Some(runs) = PerturbedRuns::of(&follower, from)
         {
             for axis in &axes {
                 let window = LinearisedWindow {
@@ -173,7 +173,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
                 solved[*axis].extend(window.solve());
             }
         }
-        pass.advance(from, WINDOW);
+        follower.advance(from, WINDOW);
     }
     for axis in axes {
         gather(rig, gridded, axis, &solved[axis], &mut unknowns.axes[axis]);
@@ -181,53 +181,56 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     linkage::gather(
         rig,
         gridded,
-        &pass.contact_n,
+        &follower.contact_n,
         [ar1_coefficients[0][0], ar1_coefficients[1][0]],
         &mut unknowns.linkage,
     );
 }
 
-struct Runs {
+struct PerturbedRuns {
     baseline: Readings,
     /// With a nudge each, in the order of [`NUMBERS`].
-    nudged: Vec<Readings>,
+    perturbed: Vec<Readings>,
     /// With that of the force the other way.
     opposite: Readings,
 }
 
-impl Runs {
+impl PerturbedRuns {
     /// `None` for a state that the rig cannot have.
-    fn of(pass: &Pass<'_>, from: usize) -> Option<Self> {
-        let nudges = NUMBERS.iter().filter_map(|(number, _, step)| Some(nudge(*number, (*step)?)));
-        Some(Runs {
-            baseline: pass.run(from, &Nudge::default())?,
-            nudged: nudges.map(|nudge| pass.run(from, &nudge)).collect::<Option<_>>()?,
-            opposite: pass.run(from, &nudge(Number::Force, -FORCE_STEP_N))?,
+    fn of(follower: &RecordFollower<'_>, from: usize) -> Option<Self> {
+        let perturbations =
+            NUMBERS.iter().filter_map(|(number, _, step)| Some(perturbation(*number, (*step)?)));
+        Some(PerturbedRuns {
+            baseline: follower.run(from, &Perturbation::default())?,
+            perturbed: perturbations
+                .map(|perturbation| follower.run(from, &perturbation))
+                .collect::<Option<_>>()?,
+            opposite: follower.run(from, &perturbation(WindowUnknown::Force, -FORCE_STEP_N))?,
         })
     }
 
-    fn nudged(&self, number: Number) -> &Readings {
-        &self.nudged[number as usize]
+    fn perturbed(&self, number: WindowUnknown) -> &Readings {
+        &self.perturbed[number as usize]
     }
 }
 
 /// The same nudge of both axes.
-fn nudge(number: Number, step: f64) -> Nudge {
-    let mut nudge = Nudge::default();
+fn perturbation(number: WindowUnknown, step: f64) -> Perturbation {
+    let mut perturbation = Perturbation::default();
     for axis in 0..2 {
         match number {
-            Number::Extension => nudge.start[axis][0] = step,
-            Number::Velocity => nudge.start[axis][1] = step,
-            Number::PressureA => nudge.start[axis][2] = step,
-            Number::PressureB => nudge.start[axis][3] = step,
-            Number::Force => nudge.force_n[axis] = step,
-            Number::Ramp => nudge.ramp_n[axis] = step,
-            Number::FlowA => nudge.flows_m3_per_s[axis][0] = step,
-            Number::FlowB => nudge.flows_m3_per_s[axis][1] = step,
-            Number::Offset => {}
+            WindowUnknown::Extension => perturbation.start[axis][0] = step,
+            WindowUnknown::Velocity => perturbation.start[axis][1] = step,
+            WindowUnknown::PressureA => perturbation.start[axis][2] = step,
+            WindowUnknown::PressureB => perturbation.start[axis][3] = step,
+            WindowUnknown::Force => perturbation.force_n[axis] = step,
+            WindowUnknown::Ramp => perturbation.ramp_n[axis] = step,
+            WindowUnknown::FlowA => perturbation.flows_m3_per_s[axis][0] = step,
+            WindowUnknown::FlowB => perturbation.flows_m3_per_s[axis][1] = step,
+            WindowUnknown::Offset => {}
         }
     }
-    nudge
+    perturbation
 }
 
 /// A window of an axis with its nudged simulations.
@@ -236,12 +239,12 @@ struct LinearisedWindow<'a> {
     axis: usize,
     from: usize,
     ar1_coefficients: &'a [f64; CHANNELS],
-    runs: &'a Runs,
+    runs: &'a PerturbedRuns,
 }
 
 impl LinearisedWindow<'_> {
     /// Solves the window; `None` when it has too few samples.
-    fn solve(&self) -> Option<Solved> {
+    fn solve(&self) -> Option<SolvedWindow> {
         let mut normal = Normal::zeros();
         let mut right = Theta::zeros();
         let mut pressure = [Theta::zeros(), Theta::zeros()];
@@ -279,11 +282,11 @@ impl LinearisedWindow<'_> {
         let bound = equations.solve(NO_OFFSET_N)?;
         let forces_n = self.runs.baseline[self.axis].iter().map(|reading| reading[FORCE]);
         let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
-        Some(Solved {
+        Some(SolvedWindow {
             from: self.from,
             baseline_force_n,
             smooth: self.is_smooth(),
-            free: equations.solve(Number::Offset.prior())?,
+            free: equations.solve(WindowUnknown::Offset.prior())?,
             bound,
         })
     }
@@ -297,26 +300,26 @@ impl LinearisedWindow<'_> {
         let mut row = Theta::zeros();
         for (number, _, step) in NUMBERS {
             // A speed known to be 0 is not estimated.
-            if let Some(step) = step.filter(|_| number != Number::Velocity || !rests) {
-                let nudged = self.runs.nudged(number)[self.axis][at][channel];
-                row[number as usize] = (nudged - baseline) / step * weight;
+            if let Some(step) = step.filter(|_| number != WindowUnknown::Velocity || !rests) {
+                let perturbed = self.runs.perturbed(number)[self.axis][at][channel];
+                row[number as usize] = (perturbed - baseline) / step * weight;
             }
         }
         if channel == FORCE {
-            row[Number::Offset as usize] = weight;
+            row[WindowUnknown::Offset as usize] = weight;
         }
         Some((row, (sample - baseline) * weight))
     }
 
     /// Whether the responses to a small force and its opposite are antisymmetric.
     fn is_smooth(&self) -> bool {
-        let Runs { baseline, opposite, .. } = self.runs;
+        let PerturbedRuns { baseline, opposite, .. } = self.runs;
         let (mut sum, mut difference) = (0.0, 0.0);
         for at in 0..WINDOW {
             for channel in 0..CHANNELS {
                 let of = |run: &Readings| run[self.axis][at][channel] / self.noise(channel);
-                let nudged = self.runs.nudged(Number::Force);
-                let (plus, minus) = (of(nudged) - of(baseline), of(opposite) - of(baseline));
+                let perturbed = self.runs.perturbed(WindowUnknown::Force);
+                let (plus, minus) = (of(perturbed) - of(baseline), of(opposite) - of(baseline));
                 sum += (plus + minus).powi(2);
                 difference += (plus - minus).powi(2);
             }
@@ -345,7 +348,9 @@ struct Equations {
 
 impl Equations {
     fn solve(&self, offset_prior_n: f64) -> Option<Solution> {
-        let prior = |number: Number| if number == Number::Offset { offset_prior_n } else { number.prior() };
+        let prior = |number: WindowUnknown| {
+            if number == WindowUnknown::Offset { offset_prior_n } else { number.prior() }
+        };
         let precision = Theta::from_fn(|at, _| prior(NUMBERS[at].0).powi(-2));
         let p = (self.normal + Normal::from_diagonal(&precision)).cholesky()?.inverse();
         let theta = p * self.right;
@@ -374,25 +379,27 @@ fn gather(
     rig: &RigParameters,
     gridded: &GriddedRecord,
     axis: usize,
-    solved: &[Solved],
+    solved: &[SolvedWindow],
     balances: &mut [Vec<UnknownPoint>; UnknownKind::ALL.len()],
 ) {
     let offsets: Vec<f64> = solved
         .iter()
-        .filter(|solved| is_informative(&solved.free, Number::Offset))
-        .map(|Solved { free, .. }| Number::Offset.of(&free.theta) / Number::Offset.of(&free.deviation))
+        .filter(|solved| is_informative(&solved.free, WindowUnknown::Offset))
+        .map(|SolvedWindow { free, .. }| {
+            WindowUnknown::Offset.of(&free.theta) / WindowUnknown::Offset.of(&free.deviation)
+        })
         .collect();
     let squares = offsets.iter().map(|offset| offset * offset).sum::<f64>() / offsets.len().max(1) as f64;
     let faulty = squares.sqrt() > OFFSET_OVER_NOISE;
-    for Solved { from, smooth, baseline_force_n, free, bound } in solved {
+    for SolvedWindow { from, smooth, baseline_force_n, free, bound } in solved {
         let best = if faulty { free } else { bound };
         let regimes = Regimes::of(rig, gridded, axis, *from);
         for kind in UnknownKind::ALL {
             let (solution, number) = match kind {
-                UnknownKind::FlowA => (best, Number::FlowA),
-                UnknownKind::FlowB => (best, Number::FlowB),
-                UnknownKind::Force => (best, Number::Force),
-                UnknownKind::ForceSensor => (free, Number::Offset),
+                UnknownKind::FlowA => (best, WindowUnknown::FlowA),
+                UnknownKind::FlowB => (best, WindowUnknown::FlowB),
+                UnknownKind::Force => (best, WindowUnknown::Force),
+                UnknownKind::ForceSensor => (free, WindowUnknown::Offset),
             };
             if !is_informative(solution, number) || !smooth && kind != UnknownKind::ForceSensor {
                 continue;
@@ -416,7 +423,7 @@ fn gather(
 }
 
 /// Whether an unknown input is observable in a window.
-fn is_informative(solution: &Solution, number: Number) -> bool {
+fn is_informative(solution: &Solution, number: WindowUnknown) -> bool {
     number.of(&solution.posterior) < OBSERVABLE_RATIO * number.prior() && number.of(&solution.deviation) > 0.0
 }
 

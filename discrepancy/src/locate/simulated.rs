@@ -19,7 +19,7 @@ pub(super) type Readings = [[[f64; CHANNELS]; WINDOW]; 2];
 
 /// A perturbation of a window, along the extension of each axis.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Nudge {
+pub(super) struct Perturbation {
     /// Extension, m; rod velocity, m/s; pressures a and b, Pa.
     pub(super) start: [[f64; 4]; 2],
     /// Force through the whole window, N.
@@ -31,14 +31,14 @@ pub(super) struct Nudge {
 }
 
 /// A plant that follows a record.
-pub(super) struct Pass<'a> {
+pub(super) struct RecordFollower<'a> {
     record: &'a GriddedRecord,
     /// F_c over the record, N, in +x on the carriage; all 0 when not linked.
     pub(super) contact_n: Vec<f64>,
     plant: Plant,
 }
 
-impl<'a> Pass<'a> {
+impl<'a> RecordFollower<'a> {
     /// A plant at the beginning of a record; `None` when the rig cannot be in such a state.
     pub(super) fn new(rig: &RigParameters, record: &'a GriddedRecord) -> Option<Self> {
         let setup = Setup { added_mass_kg: record.added_mass_kg, ..Setup::default() };
@@ -48,15 +48,15 @@ impl<'a> Pass<'a> {
             axis_state.spool = record.inputs[0].valve[axis];
         }
         plant.go_on_in(&state).ok()?;
-        Some(Pass { record, contact_n: contact_forces(rig, record), plant })
+        Some(RecordFollower { record, contact_n: contact_forces(rig, record), plant })
     }
 
     /// Readings of the window at a period with a nudge; `None` for a state that the rig cannot have.
-    pub(super) fn run(&self, from: usize, nudge: &Nudge) -> Option<Readings> {
+    pub(super) fn run(&self, from: usize, perturbation: &Perturbation) -> Option<Readings> {
         let mut plant = self.plant.clone();
         let points = [0, 1].map(|axis| {
             let mut point = self.record.smoothed_states[from][axis];
-            let [x, v, a, b] = nudge.start[axis];
+            let [x, v, a, b] = perturbation.start[axis];
             point.extension_m += x;
             point.rod_velocity_m_per_s += v;
             point.pressures_pa[0] += a;
@@ -64,11 +64,11 @@ impl<'a> Pass<'a> {
             point
         });
         plant.go_on_in(&state_at(&plant, &points, self.record.measured)).ok()?;
-        let flows = nudge.flows_m3_per_s.iter().flatten().any(|flow| *flow != 0.0);
+        let flows = perturbation.flows_m3_per_s.iter().flatten().any(|flow| *flow != 0.0);
         let mut read = [[[0.0; CHANNELS]; 2]; WINDOW];
         for (at, readings) in read.iter_mut().enumerate() {
             let share = (at as f64 + 0.5) / WINDOW as f64 * 2.0 - 1.0;
-            let forces = [0, 1].map(|axis| nudge.force_n[axis] + nudge.ramp_n[axis] * share);
+            let forces = [0, 1].map(|axis| perturbation.force_n[axis] + perturbation.ramp_n[axis] * share);
             let inputs = self.inputs(from + at, forces);
             // The sensor reads the contact force of the instant; the mean of both ends acts over the period.
             let contact_n = self.contact_n[from + at];
@@ -76,7 +76,7 @@ impl<'a> Pass<'a> {
             readings.iter_mut().zip(forces).for_each(|(reading, force_n)| reading[1] += force_n);
             plant.step(&inputs);
             if flows {
-                add_air(&mut plant, &nudge.flows_m3_per_s).ok()?;
+                add_air(&mut plant, &perturbation.flows_m3_per_s).ok()?;
             }
         }
         Some([0, 1].map(|axis| read.map(|readings| readings[axis])))

@@ -74,7 +74,7 @@ impl NotExplained {
     }
 }
 
-pub(super) struct Searched {
+pub(super) struct SearchOutcome {
     pub(super) selection: Selection,
     /// Its rounds before effects were eliminated.
     pub(super) all_rounds: Vec<Vec<Refit>>,
@@ -118,8 +118,8 @@ impl Decision {
     }
 }
 
-pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched: Searched) -> Decision {
-    let Searched { mut selection, all_rounds, lacks_fit, any_homogeneous } = searched;
+pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched: SearchOutcome) -> Decision {
+    let SearchOutcome { mut selection, all_rounds, lacks_fit, any_homogeneous } = searched;
     let likely = explanations.iter().find(|one| one.probability >= DECIDES);
     let falls_short = |one: &Explanation| {
         one.features.is_some_and(|features| {

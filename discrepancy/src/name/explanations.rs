@@ -64,8 +64,8 @@ pub(super) fn explanations(
     let of_rig_file = restarted.as_ref().unwrap_or(engine);
     let baseline = of_rig_file.squares(&of_rig_file.residual(&of_rig_file.simulate(&engine.rig)));
     let null_loss = fit::loss(&baseline, &of_rig_file.scaled_dof);
-    let alike = Alike::new(engine, linearisation, columns, fits.model);
-    let classes = classes(fits, |left, right| alike.are(left, right));
+    let similarity = ResponseSimilarity::new(engine, linearisation, columns, fits.model);
+    let classes = classes(fits, |left, right| similarity.are_alike(left, right));
     let losses = classes.iter().map(|class| class[0].loss).chain([null_loss, fits.parameters.loss]);
     let best = losses.fold(f64::INFINITY, f64::min);
     let features = |loss: f64, factors: &[f64; COUNT]| Features {
@@ -186,13 +186,13 @@ fn differ_by_alike(
 }
 
 /// Responses to effects, parameters projected out.
-struct Alike<'a> {
+struct ResponseSimilarity<'a> {
     columns: &'a Columns,
     /// Products of the columns of all probes.
     products: nalgebra::DMatrix<f64>,
 }
 
-impl<'a> Alike<'a> {
+impl<'a> ResponseSimilarity<'a> {
     /// With the weights of a model's windows.
     fn new(engine: &Engine<'_>, linearisation: &Linearisation, columns: &'a Columns, model: &Refit) -> Self {
         let probes = (0..columns.count()).map(|index| columns.column(index));
@@ -209,10 +209,10 @@ impl<'a> Alike<'a> {
             Some(parameters) => among - between.transpose() * parameters.solve(&between.into_owned()),
             None => among.into_owned(),
         };
-        Alike { columns, products: projected }
+        ResponseSimilarity { columns, products: projected }
     }
 
-    fn are(&self, left: &EffectEstimate, right: &EffectEstimate) -> bool {
+    fn are_alike(&self, left: &EffectEstimate, right: &EffectEstimate) -> bool {
         let probes = |effect: &EffectEstimate| -> Vec<usize> {
             let candidates = &self.columns.candidates;
             let is_it = |candidate: &crate::candidates::Candidate| {

@@ -47,7 +47,7 @@ pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
     if fit.loss < model.loss { fit } else { model.clone() }
 }
 
-struct Simulated {
+struct SimulatedModel {
     effects: Vec<EffectEstimate>,
     factors: [f64; COUNT],
     simulated: Vec<f64>,
@@ -58,7 +58,7 @@ struct Simulated {
     loss: f64,
 }
 
-impl Iterate for Simulated {
+impl Iterate for SimulatedModel {
     fn loss(&self) -> f64 {
         self.loss
     }
@@ -93,11 +93,15 @@ fn fit_within(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT], option
         })
     });
     let errors = errors(engine, &linearised(engine, &iterate)?, &iterate);
-    let Simulated { effects, factors, squares, loss, .. } = iterate;
+    let SimulatedModel { effects, factors, squares, loss, .. } = iterate;
     Some(Refit { effects, factors, loss, squares, errors, design_effect: model.design_effect, convergence })
 }
 
-fn iterate(engine: &Engine<'_>, effects: Vec<EffectEstimate>, factors: [f64; COUNT]) -> Option<Simulated> {
+fn iterate(
+    engine: &Engine<'_>,
+    effects: Vec<EffectEstimate>,
+    factors: [f64; COUNT],
+) -> Option<SimulatedModel> {
     let simulated = engine.simulate(&rig_of(&engine.rig, &effects, &factors)?);
     let residual = engine.residual(&simulated);
     let squares = engine.squares(&residual);
@@ -106,7 +110,7 @@ fn iterate(engine: &Engine<'_>, effects: Vec<EffectEstimate>, factors: [f64; COU
     let loss = loss(&squares, &engine.scaled_dof)
         + prior[..COUNT].iter().sum::<f64>()
         + prior[COUNT..].iter().sum::<f64>();
-    Some(Simulated { effects, factors, simulated, residual, squares, loss })
+    Some(SimulatedModel { effects, factors, simulated, residual, squares, loss })
 }
 
 /// Number of coordinates of the effects.
@@ -124,7 +128,7 @@ struct JointLinearisation {
 
 impl JointLinearisation {
     /// Normal equations with the sensitivities of some windows set to zero.
-    fn products(&self, engine: &Engine<'_>, iterate: &Simulated, excluded: &[usize]) -> Products {
+    fn products(&self, engine: &Engine<'_>, iterate: &SimulatedModel, excluded: &[usize]) -> Products {
         let mut columns = Cow::from(&self.columns);
         if !excluded.is_empty() {
             for column in columns.to_mut() {
@@ -135,7 +139,7 @@ impl JointLinearisation {
     }
 }
 
-fn linearised(engine: &Engine<'_>, iterate: &Simulated) -> Option<JointLinearisation> {
+fn linearised(engine: &Engine<'_>, iterate: &SimulatedModel) -> Option<JointLinearisation> {
     let rig = rig_of(&engine.rig, &iterate.effects, &[1.0; COUNT])?;
     let mut columns = engine.parameter_columns(&rig, &iterate.factors);
     columns.extend(coordinate_columns(engine, &iterate.factors, &iterate.effects, &iterate.simulated)?);
@@ -148,10 +152,10 @@ fn linearised(engine: &Engine<'_>, iterate: &Simulated) -> Option<JointLinearisa
 fn stepped(
     engine: &Engine<'_>,
     estimator: &mut Estimator,
-    iterate: &Simulated,
+    iterate: &SimulatedModel,
     linearisation: &JointLinearisation,
     chosen: &[usize],
-) -> Step<Simulated> {
+) -> Step<SimulatedModel> {
     let outliers: Vec<usize> = above_outlier_limit(&iterate.squares, &engine.scaled_dof).collect();
     let with_all = line_search(engine, estimator, iterate, linearisation, chosen, &[]);
     if outliers.is_empty() {
@@ -171,11 +175,11 @@ fn stepped(
 fn line_search(
     engine: &Engine<'_>,
     estimator: &mut Estimator,
-    iterate: &Simulated,
+    iterate: &SimulatedModel,
     linearisation: &JointLinearisation,
     chosen: &[usize],
     excluded: &[usize],
-) -> Step<Simulated> {
+) -> Step<SimulatedModel> {
     let part = |of: &[f64]| chosen.iter().map(|at| of[*at]).collect::<Vec<_>>();
     let (precisions, from) = (part(&linearisation.precisions), part(&linearisation.from));
     let [whole, shorter @ ..] = JOINT.fractions else { unreachable!("a whole step is tried first") };
@@ -214,11 +218,11 @@ fn line_search(
 /// The point after a fraction of a step.
 fn step_by(
     engine: &Engine<'_>,
-    from: &Simulated,
+    from: &SimulatedModel,
     chosen: &[usize],
     step: &Fit,
     share: f64,
-) -> Option<Simulated> {
+) -> Option<SimulatedModel> {
     let (mut effects, mut factors) = (from.effects.clone(), from.factors);
     let mut changes = vec![0.0; COUNT + coordinates(&effects)];
     chosen.iter().zip(&step.coefficients).for_each(|(at, coefficient)| changes[*at] = share * coefficient);
@@ -237,7 +241,7 @@ fn step_by(
 }
 
 /// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.
-fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, iterate: &Simulated) -> Vec<f64> {
+fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, iterate: &SimulatedModel) -> Vec<f64> {
     let products = linearisation.products(engine, iterate, &[]);
     let all: Vec<usize> = (0..products.columns).collect();
     let weights = products.weights(&iterate.squares);

@@ -126,7 +126,7 @@ pub(super) fn heterogeneity(
     linearisation: &Linearisation,
     model: &Refit,
 ) -> Option<Vec<Heterogeneity>> {
-    let windows = Windows::new(engine, linearisation, model)?;
+    let windows = WindowwiseFits::new(engine, linearisation, model)?;
     let mut column = linearisation.columns.len();
     (0..model.effects.len())
         .map(|at| {
@@ -153,15 +153,15 @@ pub(super) fn parameter_spread(
     if moved.is_empty() {
         return Some(spread);
     }
-    let windows = Windows::new(engine, linearisation, model)?;
+    let windows = WindowwiseFits::new(engine, linearisation, model)?;
     for at in moved {
         spread[at] = significant_spread(&windows.changes(at)?);
     }
     Some(spread)
 }
 
-/// What each window asks for beside a model: its parameters first, then the coordinates of its effects.
-struct Windows {
+/// Linearised fit of each window by itself: parameters of the model first, then the coordinates of its effects.
+struct WindowwiseFits {
     simulated: Vec<f64>,
     residual: Vec<f64>,
     columns: Vec<Vec<f64>>,
@@ -170,7 +170,7 @@ struct Windows {
     precisions: Vec<f64>,
 }
 
-impl Windows {
+impl WindowwiseFits {
     fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
         let simulated = engine.simulate(&rig_of(&engine.rig, &model.effects, &model.factors)?);
         let residual = engine.residual(&simulated);
@@ -179,7 +179,7 @@ impl Windows {
         let products = engine.products(&residual, &columns);
         let weights = products.weights(&engine.squares(&residual));
         let precisions = prior_precisions(&model.effects);
-        Some(Windows { simulated, residual, columns, products, weights, precisions })
+        Some(WindowwiseFits { simulated, residual, columns, products, weights, precisions })
     }
 
     /// Changes, as shares of it, that the windows ask for of the whole response to an effect, which stands in for one of its

@@ -25,7 +25,8 @@ use super::explanations::Explanation;
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::fit::evidence::{
-    Covariance, HeavyTailed, InputGrams, Integrated, Priors, log_marginal_likelihood, log_sum, quadrature,
+    Covariance, HeavyTailed, InputGrams, IntegratedInputs, Priors, log_marginal_likelihood, log_sum,
+    quadrature,
 };
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit, coordinate_columns, linearise, parameter_precisions, rig_of};
@@ -84,7 +85,7 @@ fn marginals(
         .collect::<Option<_>>()?;
     let (grams, places) = inputs(engine, &sensitivities, &models)?;
     let of_memory = |memory: &f64| grams.integrated(*memory, &SIZES);
-    let mut terms = vec![Integrated::none(grams.gram.len())];
+    let mut terms = vec![IntegratedInputs::none(grams.gram.len())];
     terms.extend(MEMORIES.par_iter().map(of_memory).collect::<Vec<_>>().into_iter().flatten());
     // A term under which a model has no mode adds nothing.
     let of_model = |(model, places): (&Model<'_>, &Places)| -> Vec<[f64; 3]> {
@@ -275,7 +276,7 @@ impl<'a> Model<'a> {
     }
 
     /// Log marginal likelihoods beside a term, for each scale of the amplitude priors.
-    fn log_likelihoods(&self, term: &Integrated, places: &Places) -> Option<[f64; 3]> {
+    fn log_likelihoods(&self, term: &IntegratedInputs, places: &Places) -> Option<[f64; 3]> {
         let Some(Nodes { coordinate, nodes }) = &self.nodes else {
             let reduced = term.products(&self.products, places.residual, &places.columns);
             return self.by_scale(|factor| {
@@ -310,7 +311,7 @@ impl<'a> Model<'a> {
 
     fn log_likelihood(
         &self,
-        term: &Integrated,
+        term: &IntegratedInputs,
         (plain, reduced): (&Products, &Products),
         coordinates: Vec<(HeavyTailed, f64)>,
     ) -> Option<f64> {

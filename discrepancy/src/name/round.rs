@@ -12,7 +12,7 @@ use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_sta
 use super::{LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, lacks_fit, relinearise};
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Linearisation, Refit, loss_at, refit_steps, relinearise_once};
-use crate::screen::{Columns, Screened};
+use crate::screen::{Columns, ScreenedCandidate};
 use rayon::prelude::*;
 
 /// Maximum number of candidates refitted in the simulator in each round.
@@ -47,9 +47,9 @@ const BACKLASH_BESIDE: usize = 2;
 
 struct Contenders {
     null_loss: f64,
-    best: Vec<Screened>,
+    best: Vec<ScreenedCandidate>,
     /// The backlash of linked rods, whatever its screened gain.
-    backlash: Option<Screened>,
+    backlash: Option<ScreenedCandidate>,
 }
 
 impl Contenders {
@@ -59,30 +59,33 @@ impl Contenders {
     /// The last round's threshold came from a residual with unexplained signal: it decides when to stop searching, not what to
     /// reject.
     fn of(
-        (null_loss, screened): (f64, Vec<Screened>),
+        (null_loss, screened): (f64, Vec<ScreenedCandidate>),
         engine: &Engine<'_>,
         columns: &Columns,
         model: &Refit,
         threshold: f64,
     ) -> [Option<Self>; 2] {
-        let taken =
-            |screened: &Screened| model.effects.iter().any(|effect| is_same_effect(effect, &screened.start));
-        let mut all: Vec<Screened> = screened.into_iter().filter(|screened| !taken(screened)).collect();
+        let taken = |screened: &ScreenedCandidate| {
+            model.effects.iter().any(|effect| is_same_effect(effect, &screened.start))
+        };
+        let mut all: Vec<ScreenedCandidate> =
+            screened.into_iter().filter(|screened| !taken(screened)).collect();
         all.sort_by(|left, right| left.loss.total_cmp(&right.loss));
-        let (large, small): (Vec<Screened>, Vec<Screened>) =
+        let (large, small): (Vec<ScreenedCandidate>, Vec<ScreenedCandidate>) =
             all.into_iter().partition(|screened| amplitude_ratio(&screened.start) > MIN_SCREENED_RATIO);
-        let gain = |screened: &Screened| null_loss - screened.loss;
-        let enough = |screened: &[Screened]| {
+        let gain = |screened: &ScreenedCandidate| null_loss - screened.loss;
+        let enough = |screened: &[ScreenedCandidate]| {
             screened
                 .first()
                 .is_some_and(|best| gain(best) > MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold))
         };
-        let is_backlash = |screened: &&Screened| columns.candidates[screened.at].sheet.moves_start_states;
+        let is_backlash =
+            |screened: &&ScreenedCandidate| columns.candidates[screened.at].sheet.moves_start_states;
         let backlash = if engine.is_linked() { large.iter().find(is_backlash).cloned() } else { None };
         let share = if lacks_fit(engine, null_loss) { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
         let most = [&large, &small].map(|all| all.first().map_or(0.0, gain));
         let count = if model.effects.len() < 2 { CONTENDERS } else { CONTENDERS_LATE };
-        let best = |mut all: Vec<Screened>, count: usize, least: f64| {
+        let best = |mut all: Vec<ScreenedCandidate>, count: usize, least: f64| {
             all.retain(|screened| gain(screened) > least);
             all.truncate(count);
             all
@@ -101,13 +104,13 @@ impl Contenders {
 }
 
 /// Models with one more effect.
-pub(super) struct Round<'a> {
+pub(super) struct SelectionRound<'a> {
     pub(super) fits: Vec<Refit>,
     /// Their relinearised refits, each with its start states.
     restarted: Vec<RefitWithInitialStates<'a>>,
 }
 
-impl<'a> Round<'a> {
+impl<'a> SelectionRound<'a> {
     /// The round of the candidates with the largest gains; `None` where none gains enough. Candidates below the amplitude floor
     /// take part where the others leave more than noise: a real machine differs from its rig file by many of them.
     pub(super) fn selected(
@@ -115,7 +118,7 @@ impl<'a> Round<'a> {
         linearisation: &Linearisation,
         columns: &Columns,
         model: &Refit,
-        screening: (f64, Vec<Screened>),
+        screening: (f64, Vec<ScreenedCandidate>),
         threshold: f64,
         progress: &mut dyn FnMut(&str),
     ) -> Option<Self> {
@@ -123,7 +126,7 @@ impl<'a> Round<'a> {
         let mut fitted = |contenders: &Contenders| {
             let number = model.effects.len() + 1;
             progress(&format!("fitting {} candidates, round {number}", contenders.best.len()));
-            Round::fitted(engine, linearisation, model, contenders, progress)
+            SelectionRound::fitted(engine, linearisation, model, contenders, progress)
         };
         let mut round = large.and_then(|contenders| fitted(&contenders));
         let best_loss =
@@ -211,7 +214,7 @@ impl<'a> Round<'a> {
         engine: &Engine<'a>,
         linearisation: &Linearisation,
         model: &Refit,
-        backlash: &Screened,
+        backlash: &ScreenedCandidate,
     ) {
         let start = backlash_start(engine, linearisation, &model.effects, &backlash.start);
         let Some(fit) = refit_steps(engine, linearisation, &start, STEPS) else {
@@ -249,7 +252,7 @@ fn best_start(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
     model: &[EffectEstimate],
-    screened: &Screened,
+    screened: &ScreenedCandidate,
     null_loss: f64,
 ) -> Vec<EffectEstimate> {
     let with = |amplitude: f64| {

@@ -99,7 +99,7 @@ impl Fitted<'_> {
         // Whatever the factors, these columns span what parameters do; priors count from where the factors are.
         let (columns, factors) = (self.linearisation.columns.clone(), self.calibrated.factors);
         let linearisation = Linearisation { columns, factors };
-        let all = self.columns.beside(&linearisation, &[]);
+        let all = self.columns.with_model(&linearisation, &[]);
         let products = engine.products(&truth.simulated, &all);
         let count = model.effects.len();
         let draw = |number: usize| {

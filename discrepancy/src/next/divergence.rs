@@ -20,7 +20,7 @@
 //! between two rival models.
 
 use super::closed_loop::ClosedLoopRun;
-use super::nuisance::Product;
+use super::nuisance::MarginalProduct;
 use crate::gridded_record::{AxisState, CHANNELS};
 use crate::windows::{FORCE, dot, project, state_at};
 use plant::{Inputs, Plant, RigParameters, State, Truth};
@@ -42,7 +42,7 @@ struct Observer<'a> {
 }
 
 /// Whitened readings of all windows; force readings at events are marked.
-struct Run {
+struct ObservedRun {
     readings: Vec<f64>,
     jumps: Vec<bool>,
     starts: Vec<State>,
@@ -77,7 +77,7 @@ pub(crate) fn divergences(
     let all: Vec<&RigParameters> = rigs.iter().copied().chain(perturbed).collect();
     let signatures = signatures(driven, baseline, &all, measured);
     let (signatures, sensitivities) = signatures.split_at(rigs.len());
-    let product = Product::new(sensitivities);
+    let product = MarginalProduct::new(sensitivities);
     let Some((truth, alternatives)) = signatures.split_first() else { return Vec::new() };
     let square = product.of(truth, truth).max(0.0);
     let from = |other: &Vec<f64>| {
@@ -97,7 +97,7 @@ fn signatures(
 ) -> Vec<Vec<f64>> {
     let observer = Observer::new(driven, baseline, measured);
     let base = observer.run(baseline);
-    let runs: Vec<Run> = rigs.iter().map(|rig| observer.run(rig)).collect();
+    let runs: Vec<ObservedRun> = rigs.iter().map(|rig| observer.run(rig)).collect();
     let mut left: Vec<Vec<f64>> = runs
         .iter()
         .map(|run| run.readings.iter().zip(&base.readings).map(|(value, base)| value - base).collect())
@@ -166,9 +166,9 @@ impl<'a> Observer<'a> {
         WINDOW * self.width()
     }
 
-    fn run(&self, rig: &RigParameters) -> Run {
+    fn run(&self, rig: &RigParameters) -> ObservedRun {
         let mut plant = plant_in(rig, &self.driven.start);
-        let mut run = Run { readings: Vec::new(), jumps: Vec::new(), starts: Vec::new() };
+        let mut run = ObservedRun { readings: Vec::new(), jumps: Vec::new(), starts: Vec::new() };
         for window in 0..self.windows() {
             let start = state_at(&plant, &self.points(window), [true; 2]);
             plant.go_on_in(&start).expect("a state of a run is one that the rig can be in");
@@ -207,7 +207,7 @@ impl<'a> Observer<'a> {
     fn sensitivities(
         &self,
         rig: &RigParameters,
-        base: &Run,
+        base: &ObservedRun,
         window: usize,
         out: &mut [bool],
     ) -> Vec<Vec<f64>> {

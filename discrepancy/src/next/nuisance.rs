@@ -28,12 +28,12 @@ pub(crate) fn perturbed(rig: &RigParameters, parameter: &Parameter) -> Result<Ri
 
 /// Inner product of signatures with nuisance parameters marginalised.
 #[derive(Debug)]
-pub(crate) struct Product<'a> {
+pub(crate) struct MarginalProduct<'a> {
     sensitivities: &'a [Vec<f64>],
     inverse: DMatrix<f64>,
 }
 
-impl<'a> Product<'a> {
+impl<'a> MarginalProduct<'a> {
     /// The product for these changes of the readings.
     pub(crate) fn new(sensitivities: &'a [Vec<f64>]) -> Self {
         let count = sensitivities.len();
@@ -42,7 +42,7 @@ impl<'a> Product<'a> {
         });
         // One more than positive semidefinite in every direction.
         let inverse = gram.cholesky().map_or_else(|| DMatrix::zeros(count, count), |factor| factor.inverse());
-        Product { sensitivities, inverse }
+        MarginalProduct { sensitivities, inverse }
     }
 
     /// The product of two signatures.
@@ -64,11 +64,11 @@ mod tests {
     #[test]
     fn what_a_number_explains_counts_by_no_more_than_its_prior() {
         let sensitivities = [vec![10.0, 0.0, 0.0]];
-        let product = Product::new(&sensitivities);
+        let product = MarginalProduct::new(&sensitivities);
         // Along the parameter: 1 / (1 + 100) of its square is left; across it, all.
         assert!((product.of(&[1.0, 0.0, 0.0], &[1.0, 0.0, 0.0]) - 1.0 / 101.0).abs() < 1e-12);
         assert_eq!(product.of(&[0.0, 2.0, 0.0], &[0.0, 2.0, 0.0]), 4.0);
-        assert_eq!(Product::new(&[]).of(&[3.0], &[3.0]), 9.0);
+        assert_eq!(MarginalProduct::new(&[]).of(&[3.0], &[3.0]), 9.0);
     }
 
     #[test]

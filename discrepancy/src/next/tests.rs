@@ -13,9 +13,9 @@ const FROM_END_M: f64 = 0.005;
 const LONGEST_S: f64 = 25.0;
 
 /// An effect, its place, its numbers.
-type Given<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
+type EffectSetting<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
 
-fn explained(effects: &[Given<'_>]) -> Explanation {
+fn explained(effects: &[EffectSetting<'_>]) -> Explanation {
     let mut rig = RigParameters::baseline();
     for (name, place, numbers) in effects {
         rig = rig.with_effect(name, place, numbers).expect("an effect of the catalogue");

@@ -23,7 +23,7 @@ const PERIODS: usize = 232;
 type Law = Box<dyn Fn(&[f64; VARIABLES.len()]) -> f64>;
 
 /// A formula with a factor, and perhaps a constant.
-struct Form {
+struct CandidateFormula {
     nodes: usize,
     text: String,
     unit: String,
@@ -33,7 +33,7 @@ struct Form {
 
 /// The shortest formula that explains an unknown input, its numbers in the units of the report.
 pub(crate) fn formula(sample: &Sample, unit: &str) -> Option<String> {
-    let fits: Vec<(Form, [f64; 2], f64)> = forms()
+    let fits: Vec<(CandidateFormula, [f64; 2], f64)> = forms()
         .into_iter()
         .map(|form| {
             let (numbers, gain) = fit(sample, &form);
@@ -67,7 +67,7 @@ fn binned(sample: &Sample) -> f64 {
     mean + singles.fold(0.0, f64::max) * (sample.squares() - mean)
 }
 
-fn forms() -> Vec<Form> {
+fn forms() -> Vec<CandidateFormula> {
     let mut forms = vec![form(1, "", "", true, |_| 0.0)];
     for at in (0..VARIABLES.len()).filter(|at| *at != TIME && VARIABLES[*at].complexity < MEMORY) {
         let WindowVariable { name, unit, nodes, .. } = VARIABLES[at];
@@ -96,12 +96,12 @@ fn form(
     unit: &str,
     constant: bool,
     law: impl Fn(&[f64; VARIABLES.len()]) -> f64 + 'static,
-) -> Form {
-    Form { nodes, text: text.to_owned(), unit: unit.to_owned(), law: Box::new(law), constant }
+) -> CandidateFormula {
+    CandidateFormula { nodes, text: text.to_owned(), unit: unit.to_owned(), law: Box::new(law), constant }
 }
 
 /// Factor, constant, and the weighted squares removed.
-fn fit(sample: &Sample, form: &Form) -> ([f64; 2], f64) {
+fn fit(sample: &Sample, form: &CandidateFormula) -> ([f64; 2], f64) {
     let (mut ff, mut f, mut one, mut fd, mut d) = (0.0, 0.0, 0.0, 0.0, 0.0);
     for (value, weight, variables) in sample.rows() {
         let law = (form.law)(variables);

@@ -275,7 +275,7 @@ impl LinearisedTable {
 impl TableLinearisation {
     /// Linearises a model; `None` where no rig can have it.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
-        let reference_runs = engine.pass(&model.rig(engine)?);
+        let reference_runs = engine.reference_runs(&model.rig(engine)?);
         let columns = columns(engine, &model, &model.coordinates(), &reference_runs)?;
         Some(TableLinearisation { model, reference_runs, columns })
     }

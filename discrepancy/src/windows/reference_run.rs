@@ -52,7 +52,7 @@ impl VariableRanges {
 
 impl Windows<'_> {
     /// Simulates a rig with longer steps and keeps its states.
-    pub fn pass(&self, rig: &RigParameters) -> ReferenceRun {
+    pub fn reference_run(&self, rig: &RigParameters) -> ReferenceRun {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
         let inverse = SensorInverse::of(rig);
         // A declared term may count the time.
