@@ -101,7 +101,7 @@ fn changes(rig: &RigParameters, driven: &ClosedLoopRun, edge: usize) -> Result<C
     let mut plant = Plant::in_state(rig, &driven.start).map_err(|error| error.to_string())?;
     let mut shown = Vec::new();
     for inputs in &driven.inputs[..=edge + COMPARED] {
-        shown.push(plant.shown(&plant.truth(inputs))[0]);
+        shown.push(plant.noise_free_readings(&plant.truth(inputs))[0]);
         plant.step(inputs);
     }
     let start = shown[edge];

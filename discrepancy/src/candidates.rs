@@ -105,7 +105,7 @@ impl Candidate {
             .filter(|sheet| !without.iter().any(|name| name == sheet.name))
             .flat_map(|sheet| {
                 let places = sheet.place.places().iter().copied().filter(move |place| shown(place));
-                places.map(move |place| Candidate::beside(rig, sheet, place))
+                places.map(move |place| Candidate::in_rig(rig, sheet, place))
             })
             .collect()
     }
@@ -129,8 +129,8 @@ impl Candidate {
         suspects.iter().filter(shown).map(one).collect()
     }
 
-    /// An effect at a place, beside what the rig file has there.
-    pub fn beside(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
+    /// An effect at a place, with the numbers that the rig file has there.
+    pub fn in_rig(rig: &RigParameters, sheet: &'static Sheet, place: Place) -> Candidate {
         let effect = rig.effects().iter().find(|effect| effect.name == sheet.name && effect.place == place);
         let present = effect.map(|effect| {
             let mut numbers = [0.0; MOST_KEYS];
@@ -347,7 +347,7 @@ mod tests {
             assert!(candidate.sheet.keys.len() <= MOST_KEYS, "{}", candidate.name());
             let strong = candidate.probes().remove(0);
             let Ok(rig) = candidate.rig(&RigParameters::baseline(), &strong) else { continue };
-            let here = Candidate::beside(&rig, candidate.sheet, candidate.place);
+            let here = Candidate::in_rig(&rig, candidate.sheet, candidate.place);
             assert_eq!(here.rig(&rig, &here.origin()).unwrap(), rig, "{}", here.name());
             assert_eq!(here.baseline(0), Some(candidate.effect_parameters(&strong)[0]), "{}", here.name());
             for probe in here.probes() {

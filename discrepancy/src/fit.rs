@@ -378,7 +378,7 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, Normal};
 
     /// Ten windows of 50 numbers: a wave of one column, and noise that is the same each time.
-    fn made(amplitude: f64, spoilt: bool) -> (Vec<f64>, Vec<f64>) {
+    fn synthetic_windows(amplitude: f64, spoilt: bool) -> (Vec<f64>, Vec<f64>) {
         let column: Vec<f64> = (0..500).map(|at| (f64::from(at) * 0.37).sin()).collect();
         let noise =
             (0..500_u32).map(|at| f64::from(at.wrapping_mul(2_654_435_761) >> 8) / f64::from(1 << 24) - 0.5);
@@ -396,7 +396,7 @@ mod tests {
     #[test]
     fn what_was_only_learned_is_seen_on_windows_that_were_left_out() {
         // Columns that have nothing to do with the residual, and one that is in it.
-        let (residual, column) = made(0.8, false);
+        let (residual, column) = synthetic_windows(0.8, false);
         let mut random = Pcg64::seed_from_u64(7);
         let chance: Vec<Vec<f64>> = (0..24)
             .map(|_| (0..500).map(|_| f64::from(random.next_u32()) / f64::from(u32::MAX) - 0.5).collect())
@@ -423,7 +423,7 @@ mod tests {
     #[test]
     fn the_amplitude_comes_back_even_when_a_window_is_spoilt() {
         for spoilt in [false, true] {
-            let (residual, column) = made(0.8, spoilt);
+            let (residual, column) = synthetic_windows(0.8, spoilt);
             let products = Products::new(&residual, &[&column], &[50.0; 10], 50);
             let fit = products.fit(&[0], &[0.0]);
             assert!((fit.coefficients[0] - 0.8).abs() < 0.2, "{:?}", fit.coefficients);
@@ -434,7 +434,7 @@ mod tests {
 
     #[test]
     fn a_tolerance_holds_a_coefficient_back() {
-        let (residual, column) = made(0.8, false);
+        let (residual, column) = synthetic_windows(0.8, false);
         let products = Products::new(&residual, &[&column], &[50.0; 10], 50);
         let held = products.fit(&[0], &[1e6]);
         assert!(held.coefficients[0].abs() < 0.01, "{:?}", held.coefficients);
@@ -442,7 +442,7 @@ mod tests {
 
     #[test]
     fn a_bounded_coefficient_stays_at_its_bound_and_the_others_follow() {
-        let (residual, column) = made(0.8, false);
+        let (residual, column) = synthetic_windows(0.8, false);
         let other: Vec<f64> =
             column.iter().enumerate().map(|(at, value)| value + (at as f64).cos()).collect();
         let products = Products::new(&residual, &[&column, &other], &[50.0; 10], 50);

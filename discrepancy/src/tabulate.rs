@@ -111,7 +111,7 @@ fn with_needed(engine: &Engine<'_>, best: Iterate) -> (Iterate, [bool; COUNT]) {
     let Some((linearisation, all_fixed)) = TableLinearisation::of(engine, all).zip(all_fixed) else {
         return (best, [true; COUNT]);
     };
-    let linearisation = linearisation.with(&[]);
+    let linearisation = linearisation.columns_with(&[]);
     let bare = fit::steps(engine, all_fixed, &linearisation[COUNT..]);
     let needed = fit::needed(engine, &bare, &linearisation, MIN_LOSS_REDUCTION);
     let Some(start) = Iterate::of(engine, bare.model.clone().with_fixed(needed)) else {
@@ -159,7 +159,7 @@ impl TableSearch<'_> {
         let flat = |argument: Argument, balance: Balance| {
             let mut fitted = self.table(argument, balance)?;
             fitted.table.value.fill(0.0);
-            linearisation.beside(self.engine, fitted)
+            linearisation.linearised_table(self.engine, fitted)
         };
         let flats: Vec<(Argument, Vec<LinearisedTable>)> = all
             .filter(|argument| Some(*argument) != used)
@@ -192,7 +192,7 @@ impl TableSearch<'_> {
             let point = if from.model.tables.is_empty() {
                 fit::fit(self.engine, start, FIRST_STEPS)
             } else {
-                fit::steps(self.engine, start, &linearisation.with(beside))
+                fit::steps(self.engine, start, &linearisation.columns_with(beside))
             };
             Some((point, *argument))
         });
@@ -200,7 +200,13 @@ impl TableSearch<'_> {
     }
 
     /// A model with tables of some balances, at their curves or at 0.
-    fn with(&self, model: &Model, argument: Argument, balances: &[Balance], is_flat: bool) -> Option<Model> {
+    fn with_tables(
+        &self,
+        model: &Model,
+        argument: Argument,
+        balances: &[Balance],
+        is_flat: bool,
+    ) -> Option<Model> {
         let mut model = model.clone();
         for balance in balances {
             let mut fitted = self.table(argument, *balance)?;
@@ -214,7 +220,7 @@ impl TableSearch<'_> {
 
     /// A model with tables of some balances, started at their curves or at 0, whichever has the smaller loss.
     fn start(&self, model: &Model, argument: Argument, balances: &[Balance]) -> Option<Iterate> {
-        let from = [false, true].map(|is_flat| self.with(model, argument, balances, is_flat));
+        let from = [false, true].map(|is_flat| self.with_tables(model, argument, balances, is_flat));
         let [curved, flat] = from.map(|model| Iterate::of(self.engine, model?));
         match (curved, flat) {
             (Some(curved), Some(flat)) => Some(if curved.loss < flat.loss { curved } else { flat }),

@@ -37,7 +37,7 @@ use model_fit::WORSE;
 use model_fit::stats::mean_and_variance;
 use null_power::NullPower;
 use plant::{Axis, RigParameters};
-use power::{Power, kept, levels, pooled};
+use power::{Power, levels, pooled, untrimmed};
 use records::Channel;
 use std::collections::BTreeMap;
 
@@ -90,7 +90,7 @@ pub(crate) fn verify(
     let names: Vec<String> = after.windows.outputs.iter().map(|(axis, at)| column(*axis, *at)).collect();
     let mut misfit = BTreeMap::new();
     let mut whiteness = BTreeMap::new();
-    let all_kept = kept(&power_before.smaller(power_after).joint());
+    let all_kept = untrimmed(&power_before.smaller(power_after).joint());
     for (output, name) in names.iter().enumerate() {
         let (axis, at) = after.windows.outputs[output];
         let noise = record.noise[axis][at] * levels[output].sqrt();
@@ -164,7 +164,7 @@ fn column(axis: usize, at: usize) -> String {
 /// Misfit of an output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
 fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> SignalMisfit {
     let [before, after] = models.each_ref().map(|power| power.output(output));
-    let kept = kept(&models[0].smaller(&models[1]).output(output));
+    let kept = untrimmed(&models[0].smaller(&models[1]).output(output));
     let [before_power, after_power] = [&before, &after].map(|squares| pooled(squares, &kept));
     let excess = before_power - 1.0;
     let is_resolved = excess > EXCESS_SPREADS * spread;

@@ -240,7 +240,7 @@ impl<'a> Windows<'a> {
     }
 
     fn read(&self, plant: &Plant, inputs: &Inputs, into: &mut Vec<f64>) {
-        let shown = plant.shown(&plant.truth(inputs));
+        let shown = plant.noise_free_readings(&plant.truth(inputs));
         into.extend(self.outputs.iter().map(|(axis, at)| shown[*axis][*at] / self.record.noise[*axis][*at]));
     }
 }

@@ -45,8 +45,8 @@ pub struct Residual {
 }
 
 impl Residual {
-    /// What is neither noise nor declared error, squared.
-    fn beyond(&self) -> f64 {
+    /// Square of the residual's rms less those of noise and declared error.
+    fn excess_squared(&self) -> f64 {
         self.rms.powi(2) - self.noise.powi(2) - self.model_error_rms.powi(2)
     }
 
@@ -105,7 +105,7 @@ fn residual(fitting: &Fitting<'_>, left: &[OutputSeries], output: usize) -> Resi
         is_noise: true,
     };
     let least = MOST_OF_IT.max(CERTAIN / rows.sqrt()) * rms * rms;
-    let is_noise = residual.beyond() <= least.max((NEGLIGIBLE * signal).powi(2));
+    let is_noise = residual.excess_squared() <= least.max((NEGLIGIBLE * signal).powi(2));
     Residual { is_noise, ..residual }
 }
 
@@ -113,7 +113,7 @@ impl ModelReport {
     /// Takes what is left into the verdict and the headline, after the held-out records have been.
     pub(super) fn rate(&mut self, residuals: Vec<Residual>) {
         let worst = residuals.iter().filter(|one| !one.is_noise).max_by(|one, other| {
-            let [one, other] = [one, other].map(|one| one.beyond() / one.signal_rms.powi(2));
+            let [one, other] = [one, other].map(|one| one.excess_squared() / one.signal_rms.powi(2));
             one.total_cmp(&other)
         });
         self.adequate = worst.is_none();

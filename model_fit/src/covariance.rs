@@ -31,7 +31,7 @@ pub(super) struct NumberError {
 }
 
 impl NumberError {
-    pub(super) fn whole(self) -> f64 {
+    pub(super) fn total(self) -> f64 {
         self.of_records.hypot(self.of_law)
     }
 }

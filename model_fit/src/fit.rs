@@ -213,7 +213,7 @@ impl<'a> Fitting<'a> {
     }
 
     /// The same with all rows.
-    pub(crate) fn whole(self) -> Self {
+    pub(crate) fn with_all_rows(self) -> Self {
         Self { in_score: self.records.iter().map(|record| 0..record.time_s.len()).collect(), ..self }
     }
 

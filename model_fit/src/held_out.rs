@@ -145,12 +145,12 @@ fn residuals(fitted: &Fitted<'_>, record: &[MeasuredRecord]) -> Result<(OutputSe
     let frozen = Fitting::frozen(&fitted.fitting, &fitted.point, record, &fitted.suspects, rows);
     let failed = |why| JudgeError::Failure { record: name(), why };
     if frozen.unknowns.is_empty() {
-        let residuals = frozen.whole().residuals(&[]).map_err(failed)?;
+        let residuals = frozen.with_all_rows().residuals(&[]).map_err(failed)?;
         return Ok((residuals.into_iter().next().expect("one record"), 0));
     }
     has_start(rows, &record[0])?;
     let (point, _) = frozen.fit_from(starts::starts(&frozen, &[], None), OPTIONS.steps).map_err(failed)?;
-    let residuals = frozen.whole().residuals(&point.values_si).map_err(failed)?;
+    let residuals = frozen.with_all_rows().residuals(&point.values_si).map_err(failed)?;
     Ok((residuals.into_iter().next().expect("one record"), rows))
 }
 

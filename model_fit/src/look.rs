@@ -127,7 +127,11 @@ pub(super) struct StuckFrom(pub(super) usize);
 
 impl Column<'_> {
     /// What there is to say of its values; spikes are taken out of them.
-    pub(super) fn look(&self, values: &mut [Option<f64>], lines: &[u64]) -> Result<Vec<String>, StuckFrom> {
+    pub(super) fn check_values(
+        &self,
+        values: &mut [Option<f64>],
+        lines: &[u64],
+    ) -> Result<Vec<String>, StuckFrom> {
         let mut notes = self.spikes(values, lines);
         let present: Vec<f64> = values.iter().flatten().copied().collect();
         let least = present.iter().copied().fold(f64::INFINITY, f64::min);

@@ -242,7 +242,7 @@ fn located(report: &ModelReport) -> String {
     report.located_in_words().map_or_else(String::new, |located| paragraph(&sentence(&located)))
 }
 
-fn left(label: &str, all: &[ResidualComparison]) -> String {
+fn residual_table(label: &str, all: &[ResidualComparison]) -> String {
     let rows = all.iter().map(|one| {
         vec![
             words(&one.record),

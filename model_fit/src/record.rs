@@ -137,7 +137,7 @@ impl MeasuredRecord {
         let of_outputs =
             model.outputs.iter().map(|output| Column { name: &output.column, output: Some(output) });
         for (column, values) in of_inputs.chain(of_outputs).zip(&mut values) {
-            match column.look(values, &lines) {
+            match column.check_values(values, &lines) {
                 Ok(seen) => notes.extend(seen),
                 Err(StuckFrom(row)) => {
                     let (line, column) = (lines[row], column.name.to_owned());

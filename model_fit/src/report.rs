@@ -430,7 +430,7 @@ pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool)
             suspect: fitting.suspect_of(unknown).map(|suspect| fitting.model.suspects[suspect].name.clone()),
             unit: unit.text.clone(),
             value: value / unit.factor,
-            standard_error: error.filter(|_| !is_at_bound).map(|error| error.whole() / unit.factor),
+            standard_error: error.filter(|_| !is_at_bound).map(|error| error.total() / unit.factor),
             baseline: covariance::before(baseline, unknown.id).map(|before| before / unit.factor),
             is_at_bound,
             is_of_one_sign: unknown.range_si[0] >= 0.0 || unknown.range_si[1] <= 0.0,

@@ -49,7 +49,7 @@ pub(crate) fn starts(
     suspects: &[usize],
     from: Option<(&Fitting<'_>, &Point)>,
 ) -> Vec<Vec<f64>> {
-    let first = from.map_or_else(|| fitting.start(), |from| beside(fitting, from));
+    let first = from.map_or_else(|| fitting.start(), |from| values_from(fitting, from));
     if suspects.is_empty() && from.is_some() {
         return vec![first];
     }
@@ -75,11 +75,11 @@ pub(super) fn of_newest(
     suspects: &[usize],
     from: (&Fitting<'_>, &Point),
 ) -> Vec<Vec<f64>> {
-    of_newest_from(fitting, suspects, &beside(fitting, from))
+    of_newest_from(fitting, suspects, &values_from(fitting, from))
 }
 
 /// First values of a suspect's numbers, all other numbers as in the smaller fit.
-fn beside(fitting: &Fitting<'_>, (smaller, point): (&Fitting<'_>, &Point)) -> Vec<f64> {
+fn values_from(fitting: &Fitting<'_>, (smaller, point): (&Fitting<'_>, &Point)) -> Vec<f64> {
     let known = |id: UnknownId| smaller.unknowns.iter().position(|unknown| unknown.id == id);
     let value = |place: usize| point.values_si[place];
     let unknowns = fitting.unknowns.iter();

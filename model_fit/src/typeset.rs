@@ -40,7 +40,7 @@ pub(crate) fn of_suspect(model: &Model, index: usize) -> String {
     let change = if matches!(target, Target::Input(_)) || page.reads_its_place(index) {
         page.by_itself(target, index)
     } else {
-        let (left, left_text) = page.left(target);
+        let (left, left_text) = page.left_side(target);
         let rest = || "<mo>…</mo>".to_owned();
         let side = RightHandSide { whole: rest(), term: rest(), factor: rest(), text: "…".to_owned() };
         let side = page.changed(side, index);
@@ -74,7 +74,7 @@ impl Typeset<'_> {
 
     /// The equation of a place with what changes it, and behind it what stands by itself.
     fn equation(&self, owner: Option<usize>, target: Target, value: &Expression) -> String {
-        let (left, left_text) = self.left(target);
+        let (left, left_text) = self.left_side(target);
         let mut side = RightHandSide {
             whole: self.marked(owner, self.set(value, Operand::None)),
             term: self.marked(owner, self.set(value, Operand::FirstTerm)),
@@ -88,7 +88,7 @@ impl Typeset<'_> {
     }
 
     /// The left side of the equation of a place, and the same in plain text.
-    fn left(&self, target: Target) -> (String, String) {
+    fn left_side(&self, target: Target) -> (String, String) {
         let name = self.model.target_name(target);
         match target {
             Target::State(_) => (rate(name), format!("d{name}/dt")),

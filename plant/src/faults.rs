@@ -91,16 +91,16 @@ impl AxisFaults {
     }
 }
 
-/// Valve faults at work: what they are, and what a slow valve has reached.
+/// Active valve faults, and the command that a slow valve has reached.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(crate) struct ValvesAtWork {
+pub(crate) struct ActiveValveFaults {
     faults: [ValveFault; 2],
     /// Whether any valve is faulty.
     pub(crate) any: bool,
     arrived: [f64; 2],
 }
 
-impl ValvesAtWork {
+impl ActiveValveFaults {
     /// Takes faults over; a valve that was quick so far starts from its spool.
     pub(crate) fn set(&mut self, faults: &Faults, spools: [f64; 2]) {
         let was_slow = self.faults.map(|fault| fault.lag_s > 0.0);

@@ -103,8 +103,8 @@ pub(crate) struct Node {
     pub(crate) shut: bool,
 }
 
-/// What the air does at the midpoint of a step; two values are those of chambers a and b.
-pub(crate) struct Middle<P = Pair> {
+/// Air of both axes at the midpoint of a step; two values are those of chambers a and b.
+pub(crate) struct MidpointAir<P = Pair> {
     pub(crate) extension: P,
     pub(crate) pneumatic: P,
     pub(crate) edge_flow: [P; 2],
@@ -230,7 +230,7 @@ impl Integrator {
         let middle = laws.middle(step, extra_state);
         let zero = Pair::both(0.0);
         let moving = laws.moving(step);
-        let hand = laws.outside(step, &middle);
+        let hand = laws.external_force(step, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
             hand,
@@ -238,7 +238,7 @@ impl Integrator {
             contact: zero,
         };
         if held.linked {
-            let [to_middle, _] = laws.ways(step);
+            let [to_middle, _] = laws.motion_factors(step);
             // First as if what rests stays; then again with what the contact sets in motion.
             forces.contact =
                 Pair::both(self.contact(self.kinematics(span, to_middle, &from, moving, &forces)));
@@ -287,7 +287,7 @@ impl Integrator {
         &self,
         laws: &L,
         step: StepContext<'_>,
-        middle: &Middle,
+        middle: &MidpointAir,
         force: Pair,
         moving: Mask,
     ) -> Mask {

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use crate::effects::tabulated::AxisConditions;
 use crate::effects::{Effects, Term, Terms};
-use crate::faults::{AxisFaults, Faults, ValvesAtWork};
+use crate::faults::{ActiveValveFaults, AxisFaults, Faults};
 use crate::integrator::laws::Baseline;
 use crate::integrator::{HeldInputs, Integrator, Lanes, SUBSTEPS};
 use crate::lanes::{Axes, Pair};
@@ -25,7 +25,7 @@ pub struct Plant {
     effects: Option<Box<Effects>>,
     state: State,
     faults: Faults,
-    valves: ValvesAtWork,
+    valves: ActiveValveFaults,
     /// Effects of a rig without any, ready for faults that change laws.
     spare: Option<Box<Effects>>,
 }
@@ -101,7 +101,7 @@ impl Plant {
         let faults = Faults::default();
         let integrator = Integrator::new(rig, state.added_mass_kg, substeps, &faults);
         let effects = Effects::of(rig, &integrator, &state);
-        let (valves, spare) = (ValvesAtWork::default(), None);
+        let (valves, spare) = (ActiveValveFaults::default(), None);
         Plant { rig: Arc::new(rig.clone()), integrator, effects, state, faults, valves, spare }
     }
 
@@ -176,8 +176,8 @@ impl Plant {
         Truth::at(&self.integrator, self.effects.as_deref(), &self.state, inputs)
     }
 
-    /// What the sensors would show at this instant without noise and steps: position, force, pressure a, pressure b of each axis.
-    pub fn shown(&self, truth: &Truth) -> [[f64; 4]; 2] {
+    /// Noise-free readings of the sensors, not rounded: position, force, pressure a, pressure b of each axis.
+    pub fn noise_free_readings(&self, truth: &Truth) -> [[f64; 4]; 2] {
         let Some(effects) = &self.effects else {
             return sensor_inputs(truth);
         };

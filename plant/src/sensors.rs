@@ -67,7 +67,7 @@ impl Sensors {
 
     /// Samples all sensors at this instant, drive and load; to be taken before the period's step.
     pub fn sample(&mut self, plant: &Plant, inputs: &Inputs) -> [AxisReadings; 2] {
-        let shown = plant.shown(&plant.truth(inputs));
+        let shown = plant.noise_free_readings(&plant.truth(inputs));
         let parameters = self.parameters;
         let offsets_m = [0.0, parameters.load_position_offset_m];
         std::array::from_fn(|i| {

@@ -126,7 +126,7 @@ impl Truth {
         let lanes = Lanes::load(state);
         let check_valves_shut = integrator.supply.check_valves_shut(state.supply_pressure_pa);
         let supply_pressure_pa = supply_pressure_pa(effects, state);
-        let air = AirAt::of(integrator, &lanes);
+        let air = AirState::of(integrator, &lanes);
         let edge_flow = edge_flows(integrator, effects, state, &lanes, &air);
         let forces = TrueForces::at(integrator, effects, &lanes, hand_forces(inputs), state.linked);
 
@@ -174,17 +174,17 @@ pub(crate) fn supply_pressure_pa(effects: Option<&Effects>, state: &State) -> f6
 }
 
 /// The air of both chambers at an instant.
-pub(crate) struct AirAt {
+pub(crate) struct AirState {
     pub(crate) volume: [Pair; 2],
     pub(crate) pressure: [Pair; 2],
 }
 
-impl AirAt {
+impl AirState {
     pub(crate) fn of(integrator: &Integrator, lanes: &Lanes) -> Self {
         let chambers = &integrator.chambers;
         let volume = [chambers.volume_a(lanes.extension), chambers.volume_b(lanes.extension)];
         let [a, b] = lanes.air();
-        AirAt { volume, pressure: [a.stored * volume[0].reciprocal(), b.stored * volume[1].reciprocal()] }
+        AirState { volume, pressure: [a.stored * volume[0].reciprocal(), b.stored * volume[1].reciprocal()] }
     }
 
     /// Pressures of the chambers of one axis, Pa.
@@ -198,7 +198,7 @@ fn edge_flows(
     effects: Option<&Effects>,
     state: &State,
     lanes: &Lanes,
-    air: &AirAt,
+    air: &AirState,
 ) -> [Pair; 2] {
     let exhaust_pa = integrator.chambers.exhaust_pa();
     let edges = integrator.valve.edges(lanes.spool, state.supply_pressure_pa, exhaust_pa);
@@ -260,7 +260,7 @@ impl TrueForces {
         let distance_m = integrator.distance(lanes.extension);
         let approach_m_per_s = -lanes.velocity.sum();
         let contact_n = if linked { integrator.linkage.force(distance_m, approach_m_per_s) } else { 0.0 };
-        let air = AirAt::of(integrator, lanes);
+        let air = AirState::of(integrator, lanes);
         let pneumatic = integrator.chambers.pneumatic_force(air.pressure[0], air.pressure[1]).to_array();
 
         let axis = |i: usize| {

@@ -184,7 +184,7 @@ fn a_flow_and_what_is_kept_may_follow_the_force_sensor() {
     (0..1000).for_each(|_| plant.step(&hand));
     let truth = plant.truth(&hand);
     // Twenty time constants: the rest is below a rounding of the sum.
-    assert!((plant.shown(&truth)[1][2] - truth.axes[1].pressure_a_pa + 30.0).abs() < 1e-4);
+    assert!((plant.noise_free_readings(&truth)[1][2] - truth.axes[1].pressure_a_pa + 30.0).abs() < 1e-4);
     assert!((truth.axes[1].effect_force_n - 30.0).abs() < 1e-6, "{}", truth.axes[1].effect_force_n);
     let flow = plant.term_names().iter().position(|name| name == "load_leakage_declared_a_m3_per_s");
     let flow = plant.terms(&hand).values()[flow.expect("a term")];
@@ -217,7 +217,7 @@ fn a_reading_is_the_truth_and_its_term_and_leaves_the_motion_alone() {
     });
     let (truth, expected) = (plant.truth(&inputs(2000)), bare.truth(&inputs(2000)));
     same_but_for_rounding(&truth, &expected);
-    let (shown, [drive, load]) = (plant.shown(&truth), truth.axes);
+    let (shown, [drive, load]) = (plant.noise_free_readings(&truth), truth.axes);
     assert!((shown[0][0] - (1.001 * drive.position_m + 1e-3)).abs() < 1e-12);
     assert!((shown[0][1] - 1.02 * drive.sensor_force_n).abs() < 1e-9);
     let acts = inputs(1999).valve[1];
@@ -246,7 +246,8 @@ fn a_reading_that_remembers_is_a_lagging_sensor() {
         [&term, &lagging].map(|rig| Plant::new(rig, &Setup::default()).expect("good"));
     let mut most_m = 0.0_f64;
     for period in 0..2000 {
-        let [one, two] = [&term, &lagging].map(|plant| plant.shown(&plant.truth(&inputs(period)))[0][0]);
+        let [one, two] =
+            [&term, &lagging].map(|plant| plant.noise_free_readings(&plant.truth(&inputs(period)))[0][0]);
         // It sees the end of a substep held, and the sensor a straight line: half a substep of a fast stroke.
         assert!((one - two).abs() < 5e-5, "{period}: {one} {two}");
         most_m = most_m.max((one - term.truth(&inputs(period)).axes[0].position_m).abs());
@@ -271,7 +272,7 @@ fn a_play_moves_only_when_the_axis_has_taken_it_up() {
     let mut off = [0.0_f64; 2];
     for period in 0..3000 {
         let truth = plant.truth(&inputs(period));
-        let by = plant.shown(&truth)[0][2] - truth.axes[0].pressure_a_pa;
+        let by = plant.noise_free_readings(&truth)[0][2] - truth.axes[0].pressure_a_pa;
         off = [off[0].min(by), off[1].max(by)];
         plant.step(&inputs(period));
     }

@@ -157,7 +157,7 @@ fn going_on_in_the_state_that_it_is_in_changes_nothing() {
             again.step(&inputs(k));
             assert_eq!(straight.state(), again.state(), "{} at {k} ms", sheet.name);
         }
-        let shown = |plant: &Plant| plant.shown(&plant.truth(&inputs(700)));
+        let shown = |plant: &Plant| plant.noise_free_readings(&plant.truth(&inputs(700)));
         assert_eq!(shown(&straight), shown(&again), "{}", sheet.name);
     }
 }
@@ -173,7 +173,7 @@ fn sensors_that_are_late_see_no_jump_when_a_plant_goes_on_in_another_state() {
         plant.go_on_in(&state).unwrap();
         for _ in 0..10 {
             let truth = plant.truth(&Inputs::default());
-            let off_pa = plant.shown(&truth)[0][2] - truth.axes[0].pressure_a_pa;
+            let off_pa = plant.noise_free_readings(&truth)[0][2] - truth.axes[0].pressure_a_pa;
             // The chamber itself moves on, but by little; the jump was a bar and a half.
             assert!(off_pa.abs() < 2e4, "{effect}: {off_pa} Pa");
             plant.step(&Inputs::default());

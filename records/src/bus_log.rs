@@ -154,11 +154,11 @@ fn rows(
         match (logged.frame, cycle) {
             (Frame::DriveSensors(sensors), Some(cycle)) => {
                 newest = newest.max(*cycle);
-                sent.entry(*cycle).or_default().take(file, 0, sensors, logged.line, *cycle)?;
+                sent.entry(*cycle).or_default().add_sensors(file, 0, sensors, logged.line, *cycle)?;
             }
             (Frame::LoadSensors(sensors), Some(cycle)) => {
                 newest = newest.max(*cycle);
-                sent.entry(*cycle).or_default().take(file, 1, sensors, logged.line, *cycle)?;
+                sent.entry(*cycle).or_default().add_sensors(file, 1, sensors, logged.line, *cycle)?;
             }
             (Frame::RigStatus(status), _) => {
                 sent.entry(newest).or_default().supply_pressure_pa = Some(status.supply_pressure_pa);

@@ -77,7 +77,7 @@ pub fn calibrate_tables(engine: &Engine<'_>, calibrated: &Refit) -> Option<Table
     let mut factors: Vec<f64> = calibrated.factors.to_vec();
     factors.resize(precisions.len(), 1.0);
     let linearised = |factors: Vec<f64>| -> Option<Linearised> {
-        let residual = engine.residual(&engine.simulate(&with(rig, &entries, &factors)?));
+        let residual = engine.residual(&engine.simulate(&rig_with(rig, &entries, &factors)?));
         let products = engine.products(&residual, &columns(engine, &entries, &factors)?);
         let off: Vec<f64> = factors.iter().map(|factor| factor - 1.0).collect();
         let fit = products.fit_from(&all, &precisions, &off);
@@ -86,7 +86,7 @@ pub fn calibrate_tables(engine: &Engine<'_>, calibrated: &Refit) -> Option<Table
     // At the end of a range the last iterate stands.
     let (best, _) = Estimator::new(CALIBRATION).descend(linearised(factors)?, |estimator, from| {
         estimator.backtrack(from, 0.0, CALIBRATION.fractions, |_| {
-            linearised(moved(rig, &entries, &from.factors, &from.fit.coefficients)?)
+            linearised(valid_step(rig, &entries, &from.factors, &from.fit.coefficients)?)
         })
     });
     let Linearised { factors: at, products, fit } = best;
@@ -98,7 +98,7 @@ pub fn calibrate_tables(engine: &Engine<'_>, calibrated: &Refit) -> Option<Table
     let sums: Vec<Vec<usize>> = all.iter().map(|at| vec![*at]).chain(in_file).collect();
     let errors = products.jackknife_of_sums(&all, &fit, &precisions, &sums)?;
     let (factor_errors, file_errors) = errors.split_at(all.len());
-    let factors = moved(rig, &entries, &at, &fit.coefficients)?;
+    let factors = valid_step(rig, &entries, &at, &fit.coefficients)?;
 
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
@@ -147,7 +147,7 @@ fn entries(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<TableEntry> {
     let has_neighbours = |entry: &TableEntry| {
         [FACTOR_CHANGE, -FACTOR_CHANGE].iter().all(|change| {
             let factors: Vec<f64> = parameters.iter().copied().chain([1.0 + change]).collect();
-            with(rig, std::slice::from_ref(entry), &factors).is_some()
+            rig_with(rig, std::slice::from_ref(entry), &factors).is_some()
         })
     };
     let of_key = |(key, prior_std): (&'static str, f64)| {
@@ -162,7 +162,7 @@ fn entries(rig: &RigParameters, parameters: &[f64; COUNT]) -> Vec<TableEntry> {
 }
 
 /// The rig with all factors; `None` where one leaves its range or a table is not monotonic.
-fn with(rig: &RigParameters, entries: &[TableEntry], factors: &[f64]) -> Option<RigParameters> {
+fn rig_with(rig: &RigParameters, entries: &[TableEntry], factors: &[f64]) -> Option<RigParameters> {
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
     let rig = with_factors(rig, &parameter_factors);
@@ -182,14 +182,19 @@ fn with(rig: &RigParameters, entries: &[TableEntry], factors: &[f64]) -> Option<
 }
 
 /// The factors after the largest valid fraction of a step.
-fn moved(rig: &RigParameters, entries: &[TableEntry], factors: &[f64], step: &[f64]) -> Option<Vec<f64>> {
+fn valid_step(
+    rig: &RigParameters,
+    entries: &[TableEntry],
+    factors: &[f64],
+    step: &[f64],
+) -> Option<Vec<f64>> {
     SHARES.iter().find_map(|share| {
         let moved: Vec<f64> = factors
             .iter()
             .zip(step)
             .map(|(factor, step)| (factor + share * step).clamp(1.0 - 2.0 * MOST_OFF, 1.0 + 2.0 * MOST_OFF))
             .collect();
-        with(rig, entries, &moved).map(|_| moved)
+        rig_with(rig, entries, &moved).map(|_| moved)
     })
 }
 
@@ -198,7 +203,7 @@ fn columns(engine: &Engine<'_>, entries: &[TableEntry], factors: &[f64]) -> Opti
         (0..factors.len()).map(move |at| {
             let mut factors = factors.to_vec();
             factors[at] += change;
-            with(&engine.rig, entries, &factors)
+            rig_with(&engine.rig, entries, &factors)
         })
     };
     let rigs = perturbed(FACTOR_CHANGE).chain(perturbed(-FACTOR_CHANGE)).collect::<Option<Vec<_>>>()?;

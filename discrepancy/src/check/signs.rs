@@ -124,7 +124,7 @@ fn motion(notes: &Notes, rig: &RigParameters, grid: &Grid, axis: Axis, reading: 
     let series = |signal| grid.series(notes, Channel::Of(axis, signal));
     let stroke = rig.cylinder().stroke_m;
     let sign = if reading == ColumnReading::ValveSign { -1.0 } else { 1.0 };
-    let opening = held(&series(Signal::Valve), sign);
+    let opening = hold_last(&series(Signal::Valve), sign);
     let mut position = series(Signal::Position);
     if reading == ColumnReading::PositionSign {
         let negative = position.iter().flatten().filter(|value| **value < 0.0).count() * 2 > position.len();
@@ -145,8 +145,8 @@ fn motion(notes: &Notes, rig: &RigParameters, grid: &Grid, axis: Axis, reading: 
     Motion { opening, extension_m, pressures_pa, force_n }
 }
 
-/// The command held over what is missing.
-fn held(values: &[Option<f64>], sign: f64) -> Vec<Option<f64>> {
+/// The command, its last value held where samples are missing.
+fn hold_last(values: &[Option<f64>], sign: f64) -> Vec<Option<f64>> {
     let mut last = None;
     values
         .iter()

@@ -49,7 +49,7 @@ impl<'a> RestClassifier<'a> {
         let slow = |parabola: &Parabola| parabola.slope.abs() < SLOW_ERRORS * error;
         let slow: Vec<bool> = parabolas.iter().map(|parabola| parabola.as_ref().is_some_and(slow)).collect();
         let mut classifier = RestClassifier { parabolas, positions, noise_m, slow, rests: Vec::new() };
-        classifier.rests = (0..positions.len()).map(|place| classifier.rest(place)).collect();
+        classifier.rests = (0..positions.len()).map(|place| classifier.resting_position(place)).collect();
         classifier
     }
 
@@ -73,7 +73,7 @@ impl<'a> RestClassifier<'a> {
         }
     }
 
-    fn rest(&self, place: usize) -> Option<f64> {
+    fn resting_position(&self, place: usize) -> Option<f64> {
         let from = place.saturating_sub(REST_REACH);
         let to = (place + REST_REACH + 1).min(self.slow.len());
         if !self.slow[from..to].iter().all(|slow| *slow) {

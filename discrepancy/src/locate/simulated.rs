@@ -72,7 +72,7 @@ impl<'a> RecordFollower<'a> {
             let inputs = self.inputs(from + at, forces);
             // The sensor reads the contact force of the instant; the mean of both ends acts over the period.
             let contact_n = self.contact_n[from + at];
-            *readings = plant.shown(&plant.truth(&touched(inputs, contact_n, forces)));
+            *readings = plant.noise_free_readings(&plant.truth(&touched(inputs, contact_n, forces)));
             readings.iter_mut().zip(forces).for_each(|(reading, force_n)| reading[1] += force_n);
             plant.step(&inputs);
             if flows {

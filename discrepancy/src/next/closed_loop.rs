@@ -102,7 +102,7 @@ pub fn drive(
     let stroke_m = rig.cylinder().stroke_m;
     while inputs.len() < LONGEST && !rehearsal.ended() {
         let plant = rehearsal.plant();
-        readings.push(plant.shown(&plant.truth(&Inputs::default())));
+        readings.push(plant.noise_free_readings(&plant.truth(&Inputs::default())));
         let rehearsed = rehearsal.step(|_, _| {});
         let in_experiment = |record: &AxisRecord| record.main == MainChainState::Experiment;
         if began.is_none() && rehearsed.axes.iter().flatten().any(in_experiment) {

@@ -184,7 +184,7 @@ impl<'a> Observer<'a> {
         let mut phases = Vec::with_capacity(WINDOW + 1);
         for inputs in &self.driven.inputs[window * WINDOW..][..WINDOW] {
             let truth = plant.truth(inputs);
-            let shown = plant.shown(&truth);
+            let shown = plant.noise_free_readings(&truth);
             for axis in &self.measured {
                 readings.extend(shown[*axis].iter().zip(self.noise).map(|(value, noise)| value / noise));
             }

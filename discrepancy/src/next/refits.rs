@@ -252,7 +252,7 @@ fn free_effects(
     let free = explanation.rig.effects().iter().filter(|effect| !baseline.effects().contains(effect));
     free.map(|effect| {
         let sheet = plant::effects::sheet(effect.name).expect("an effect that is on has a sheet");
-        let candidate = Candidate::beside(baseline, sheet, effect.place);
+        let candidate = Candidate::in_rig(baseline, sheet, effect.place);
         let coordinates: Vec<f64> =
             (0..sheet.keys.len()).map(|key| candidate.coordinate(key, effect.numbers[key])).collect();
         let name = format!("{} {}", effect.name, effect.place);

@@ -243,7 +243,7 @@ fn surface_figure(surface: &Surface) -> String {
     const LINES: [&str; 3] = ["line s0", "line s1", "line s2"];
     let [first, second] = &surface.variables;
     let ((x_unit, x_factor), (z_unit, z_factor)) =
-        (words::shown(&surface.variable_units[0]), words::shown(&surface.variable_units[1]));
+        (words::display_unit(&surface.variable_units[0]), words::display_unit(&surface.variable_units[1]));
     let (y_unit, y_factor) = words::shown_small(&surface.unit);
     let all = surface.value.iter().flatten().flatten().map(|value| value * y_factor);
     let at = surface.at[0].iter().map(|at| at * x_factor);
@@ -272,7 +272,7 @@ fn labelled(name: &str, unit: &str) -> String {
 }
 
 pub(super) fn curve_figure(identifier: &str, caption: &str, curve: &Curve) -> String {
-    let (x_unit, x_factor) = words::shown(&curve.variable_unit);
+    let (x_unit, x_factor) = words::display_unit(&curve.variable_unit);
     let (y_unit, y_factor) = words::shown_small(&curve.unit);
     let scaled =
         |values: &[f64], factor: f64| -> Vec<f64> { values.iter().map(|value| value * factor).collect() };

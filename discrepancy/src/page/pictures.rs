@@ -67,7 +67,7 @@ fn all(report: &Report, pictures: &Pictures, model: Model, lead: &str) -> String
 }
 
 fn pair(report: &Report, trace: &Trace, model: Model) -> String {
-    charts(&[close(report, trace, model), whole(report, trace, model)])
+    charts(&[close(report, trace, model), residual_plot(report, trace, model)])
 }
 
 fn rms(values: &[f64]) -> f64 {
@@ -103,7 +103,7 @@ fn worst(trace: &Trace) -> Range<usize> {
 
 fn close(report: &Report, trace: &Trace, model: Model) -> String {
     let part = worst(trace);
-    let (unit, factor) = words::shown(&trace.unit);
+    let (unit, factor) = words::display_unit(&trace.unit);
     let cut = |values: &[f64]| -> Vec<f64> {
         values.get(part.clone()).unwrap_or_default().iter().map(|value| value * factor).collect()
     };
@@ -119,7 +119,7 @@ fn close(report: &Report, trace: &Trace, model: Model) -> String {
         &format!("{}, {unit}", words::signal(&trace.signal)),
     );
     let simulated = if model == Model::Before { &before } else { &after };
-    let (class, area) = look(model);
+    let (class, area) = line_classes(model);
     plot.series("line s0", "trace s0", &columns(time_s, &measured, COLUMNS));
     plot.series(class, area, &columns(time_s, simulated, COLUMNS));
     let name = match model {
@@ -139,7 +139,7 @@ fn close(report: &Report, trace: &Trace, model: Model) -> String {
     )
 }
 
-fn look(model: Model) -> (&'static str, &'static str) {
+fn line_classes(model: Model) -> (&'static str, &'static str) {
     match model {
         Model::Before => ("line s1", "trace s1"),
         Model::After => ("line s2", "trace s2"),
@@ -151,10 +151,10 @@ fn difference(trace: &Trace) -> (String, f64) {
     if trace.noise > 0.0 {
         return ("times the noise".to_owned(), 1.0 / trace.noise);
     }
-    words::shown(&trace.unit)
+    words::display_unit(&trace.unit)
 }
 
-fn whole(report: &Report, trace: &Trace, model: Model) -> String {
+fn residual_plot(report: &Report, trace: &Trace, model: Model) -> String {
     let (unit, factor) = difference(trace);
     let has_noise = trace.noise > 0.0;
     let scaled = |values: &[f64]| -> Vec<f64> { values.iter().map(|value| value * factor).collect() };

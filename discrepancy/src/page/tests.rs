@@ -18,7 +18,7 @@ fn text(page: &str) -> String {
     words.concat().split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
-fn made(verdict: Verdict) -> String {
+fn rendered(verdict: Verdict) -> String {
     let (report, pictures) = sample(verdict);
     page(&report, &pictures)
 }
@@ -26,12 +26,13 @@ fn made(verdict: Verdict) -> String {
 #[test]
 fn the_page_of_each_verdict_is_well_formed_self_contained_and_small() {
     for verdict in VERDICTS {
-        let made = made(verdict);
+        let rendered = rendered(verdict);
         // For who wants to look at them: PAGES=folder cargo test -p discrepancy page::
         if let Some(folder) = std::env::var_os("PAGES") {
-            std::fs::write(std::path::Path::new(&folder).join(format!("{verdict:?}.html")), &made).unwrap();
+            std::fs::write(std::path::Path::new(&folder).join(format!("{verdict:?}.html")), &rendered)
+                .unwrap();
         }
-        let document = parsed(&made);
+        let document = parsed(&rendered);
         let mut identifiers: Vec<_> =
             document.descendants().filter_map(|node| node.attribute("id")).collect();
         let count = identifiers.len();
@@ -50,24 +51,24 @@ fn the_page_of_each_verdict_is_well_formed_self_contained_and_small() {
                 assert!(!value.contains("NaN") && !value.contains("inf"), "{verdict:?}: {part}={value}");
             }
         }
-        assert!(made.len() < 600_000, "{verdict:?}: {} bytes", made.len());
-        assert_eq!(made, self::made(verdict), "the same bytes each time");
+        assert!(rendered.len() < 600_000, "{verdict:?}: {} bytes", rendered.len());
+        assert_eq!(rendered, self::rendered(verdict), "the same bytes each time");
     }
 }
 
 #[test]
 fn the_test_of_a_name_stands_beside_the_explanations() {
-    let seen = text(&made(Verdict::Named));
+    let seen = text(&rendered(Verdict::Named));
     let said = "piston-leakage (drive) gains 1612, and 1480 without its 3 best windows, where a name needs more than 0. Of \
                 5 simulated records with parameters alone 0 reach 1480, and the best gains -3 (p below 0.001). Of 5 \
                 simulated records with inclination (drive) instead 0 put it as far ahead (p 0.002).";
     assert!(seen.contains(said), "{seen}");
-    assert!(!text(&made(Verdict::NothingMissing)).contains("simulated records"));
+    assert!(!text(&rendered(Verdict::NothingMissing)).contains("simulated records"));
 }
 
 #[test]
 fn the_verdict_stands_first_with_names_numbers_and_errors() {
-    let page = made(Verdict::Named);
+    let page = rendered(Verdict::Named);
     let seen = text(&page);
     let all_candidates = format!("All {} candidates", SHEETS.len());
     let order = [
@@ -160,19 +161,19 @@ fn a_name_that_is_not_the_most_probable_explanation_says_so() {
     assert!(report.more_probable().is_none());
     report.explanations[1].probability = 0.6;
     report.explanations[2].probability = 0.37;
-    let made = page(&report, &pictures);
-    let seen = text(&made);
+    let rendered = page(&report, &pictures);
+    let seen = text(&rendered);
     assert!(
         seen.contains("Named is piston-leakage at the drive axis") && seen.contains("(37 %), the best model"),
         "{seen}"
     );
     assert!(seen.contains("although parameters alone (60 %) is more probable"), "{seen}");
-    assert!(seen.starts_with("What the simulation lacks") && made.contains("<p>? "), "an open question");
+    assert!(seen.starts_with("What the simulation lacks") && rendered.contains("<p>? "), "an open question");
 }
 
 #[test]
 fn what_was_compared_stands_with_what_speaks_against_it() {
-    let seen = text(&made(Verdict::Named));
+    let seen = text(&rendered(Verdict::Named));
     // exp(3.1), exp(-0.01).
     for part in [
         "What else it could be",
@@ -187,7 +188,7 @@ fn what_was_compared_stands_with_what_speaks_against_it() {
 
 #[test]
 fn small_effects_stand_apart_from_what_is_missing() {
-    let seen = text(&made(Verdict::Named));
+    let seen = text(&rendered(Verdict::Named));
     let named = seen.find("piston-leakage at the drive axis: leakage").expect("what is missing");
     let small = seen.find("smaller: valve-offset at the load axis: offset 0.21").expect("what is small");
     assert!(named < small, "{seen}");
@@ -208,7 +209,7 @@ fn where_only_small_effects_were_found_the_rig_file_is_not_called_right() {
 
 #[test]
 fn what_is_ambiguous_stands_together_with_the_experiment_that_tells() {
-    let seen = text(&made(Verdict::Ambiguous));
+    let seen = text(&rendered(Verdict::Ambiguous));
     for part in [
         "inclination",
         "or friction-asymmetry at the drive axis: asymmetry 47.1 \u{b1} 1.2 %; it explains 94 % of the log misfit there",
@@ -222,7 +223,7 @@ fn what_is_ambiguous_stands_together_with_the_experiment_that_tells() {
 
 #[test]
 fn nothing_missing_is_said_with_its_limits_and_has_no_picture_after() {
-    let page = made(Verdict::NothingMissing);
+    let page = rendered(Verdict::NothingMissing);
     let seen = text(&page);
     assert!(seen.contains("\u{2713} Nothing is missing above the detection limits"));
     assert!(seen.contains("would have shown from"));
@@ -232,7 +233,7 @@ fn nothing_missing_is_said_with_its_limits_and_has_no_picture_after() {
 
 #[test]
 fn what_is_outside_the_catalogue_has_its_curve_formula_and_significance() {
-    let page = made(Verdict::OutsideCatalogue);
+    let page = rendered(Verdict::OutsideCatalogue);
     let seen = text(&page);
     for part in [
         "drive: force on the piston",
@@ -252,7 +253,7 @@ fn what_is_outside_the_catalogue_has_its_curve_formula_and_significance() {
 
 #[test]
 fn bad_data_shows_its_findings_first_and_no_pictures() {
-    let page = made(Verdict::BadData);
+    let page = rendered(Verdict::BadData);
     let seen = text(&page);
     assert!(seen.contains("\u{2717} train.csv: pressure b does not change"));
     let stuck = seen.find("record again").expect("the fatal finding");
@@ -262,7 +263,7 @@ fn bad_data_shows_its_findings_first_and_no_pictures() {
 
 #[test]
 fn parameters_are_reported_with_what_the_rig_file_says() {
-    let seen = text(&made(Verdict::ParametersOnly));
+    let seen = text(&rendered(Verdict::ParametersOnly));
     assert!(seen.contains("parameter:mass: 5.263 \u{b1} 0.041 kg, the rig file says 5.00 kg"), "{seen}");
 }
 

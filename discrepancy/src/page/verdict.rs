@@ -60,7 +60,7 @@ pub(super) fn head(report: &Report) -> String {
     };
     let mut points: Vec<String> = report.named.iter().flat_map(named).collect();
     points.extend(report.named_explanation().map(probability));
-    points.extend(report.small.iter().map(|small| one(small, "<i>smaller:</i> ")));
+    points.extend(report.small.iter().map(|small| effect_line(small, "<i>smaller:</i> ")));
     points.extend(report.parameters.iter().map(|quantity| {
         let before = quantity.before.map_or(String::new(), |before| {
             format!(", the rig file says {}", words::with_unit(&words::short(before), &quantity.unit))
@@ -72,7 +72,7 @@ pub(super) fn head(report: &Report) -> String {
             escaped(&before)
         )
     }));
-    points.extend(report.nearest.iter().map(|nearest| one(nearest, "<i>resembles</i> ")));
+    points.extend(report.nearest.iter().map(|nearest| effect_line(nearest, "<i>resembles</i> ")));
     points.extend(report.remaining.iter().map(|remaining| {
         format!(
             "More is missing, in this balance: {}; it depends on {}",
@@ -99,15 +99,17 @@ pub(super) fn head(report: &Report) -> String {
 
 /// An effect and its alternatives, with equal weight.
 fn named(named: &NamedEffect) -> Vec<String> {
-    let line = one(named, "");
-    std::iter::once(line).chain(named.alternatives.iter().map(|other| one(other, "<i>or</i> "))).collect()
+    let line = effect_line(named, "");
+    std::iter::once(line)
+        .chain(named.alternatives.iter().map(|other| effect_line(other, "<i>or</i> ")))
+        .collect()
 }
 
 fn probability(named: &Explanation) -> String {
     format!("Probability of this explanation: {}", words::percent(named.probability))
 }
 
-fn one(named: &NamedEffect, before: &str) -> String {
+fn effect_line(named: &NamedEffect, before: &str) -> String {
     let numbers = words::numbers(named);
     let numbers = if numbers.is_empty() { numbers } else { format!(": {numbers}") };
     format!(

@@ -66,8 +66,8 @@ pub(super) fn spelt(unit: &str) -> String {
     if unit == "um" { "\u{b5}m".to_owned() } else { unit }
 }
 
-/// What a unit of a record is shown in, and the factor: pressures in bar, lengths in mm.
-pub(super) fn shown(unit: &str) -> (String, f64) {
+/// Unit in which values of a record's unit are displayed, and the factor: pressures in bar, lengths in mm.
+pub(super) fn display_unit(unit: &str) -> (String, f64) {
     match unit {
         "m" => ("mm".to_owned(), 1e3),
         "m/s" => ("mm/s".to_owned(), 1e3),

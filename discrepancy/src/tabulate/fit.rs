@@ -281,13 +281,17 @@ impl TableLinearisation {
     }
 
     /// Columns of the model and of further tables.
-    pub(super) fn with<'a>(&'a self, tables: &[&'a LinearisedTable]) -> Vec<&'a [f64]> {
+    pub(super) fn columns_with<'a>(&'a self, tables: &[&'a LinearisedTable]) -> Vec<&'a [f64]> {
         let more = tables.iter().flat_map(|beside| &beside.columns);
         self.columns.iter().chain(more).map(Vec::as_slice).collect()
     }
 
     /// Linearises one more table of zeros; `None` where no rig can have it.
-    pub(super) fn beside(&self, engine: &Engine<'_>, fitted: FittedTable) -> Option<LinearisedTable> {
+    pub(super) fn linearised_table(
+        &self,
+        engine: &Engine<'_>,
+        fitted: FittedTable,
+    ) -> Option<LinearisedTable> {
         let mut model = self.model.clone();
         model.tables.push(fitted.clone());
         let coordinates = model.coordinates().split_off(self.columns.len());
@@ -315,7 +319,7 @@ impl TableLinearisation {
     ) -> f64 {
         let mut model = self.model.clone();
         model.tables.extend(tables.iter().map(|beside| beside.fitted.clone()));
-        let columns = self.with(tables);
+        let columns = self.columns_with(tables);
         let products = engine.products(&point.residual, &columns);
         let all: Vec<usize> = (0..columns.len()).collect();
         let fit = products.fit_from(&all, &model.precisions(), &model.deviations());
@@ -367,7 +371,7 @@ pub(super) fn fit(engine: &Engine<'_>, start: Iterate, steps: usize) -> Iterate 
         let Some(linearisation) = TableLinearisation::of(engine, point.model.clone()) else {
             return Step::Impossible;
         };
-        let (next, within) = steps_within(engine, point.clone(), &linearisation.with(&[]));
+        let (next, within) = steps_within(engine, point.clone(), &linearisation.columns_with(&[]));
         estimator.count_all(within);
         match within {
             Convergence { iterations: 0, outcome: Outcome::Stalled, .. } => {

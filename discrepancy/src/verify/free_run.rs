@@ -32,7 +32,7 @@ pub(super) fn free_run(record: &GriddedRecord, rig: &RigParameters) -> FreeRun {
     let mut unphysical: BTreeMap<(usize, &str), usize> = BTreeMap::new();
     for (period, (inputs, samples)) in record.inputs.iter().zip(&record.samples).enumerate() {
         let truth = plant.truth(inputs);
-        let shown = plant.shown(&truth);
+        let shown = plant.noise_free_readings(&truth);
         for i in (0..2).filter(|i| record.measured[*i]) {
             let axis = &truth.axes[i];
             let extension_m = plant.state().axes[i].extension_m;

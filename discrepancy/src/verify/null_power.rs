@@ -1,7 +1,7 @@
 //! Null distribution of the residual power, from draws of noise and synthetic records.
 
 use super::Model;
-use super::power::{Power, kept, levels, pooled, sums};
+use super::power::{Power, levels, pooled, sums, untrimmed};
 use crate::windows::Windows;
 use model_fit::stats::mean_and_variance;
 use rand_core::SeedableRng;
@@ -69,7 +69,7 @@ impl NullPower {
             powers.iter().map(|power| power.divided_by_levels(&levels(power, &null))).collect();
         let of_output = |power: &Power, output: usize| {
             let squares = power.output(output);
-            pooled(&squares, &kept(&squares))
+            pooled(&squares, &untrimmed(&squares))
         };
         null.spreads = (0..outputs)
             .map(|output| spread(&powers.iter().map(|power| of_output(power, output)).collect::<Vec<_>>()).1)
@@ -99,7 +99,7 @@ impl NullPower {
 
 fn joint(power: &Power) -> f64 {
     let squares = power.joint();
-    pooled(&squares, &kept(&squares))
+    pooled(&squares, &untrimmed(&squares))
 }
 
 fn spread(values: &[f64]) -> (f64, f64) {

@@ -119,7 +119,7 @@ pub(super) fn levels(power: &Power, null: &NullPower) -> Vec<f64> {
 
 /// Windows that remain after trimming. Of two models `squares` has the smaller power of both in each window, so that a fault of
 /// the record is trimmed and an error of one model alone is not.
-pub(super) fn kept(squares: &[Squares]) -> Vec<bool> {
+pub(super) fn untrimmed(squares: &[Squares]) -> Vec<bool> {
     let mut order: Vec<usize> = (0..squares.len()).filter(|at| squares[*at].expected > 0.0).collect();
     // A stable sort: equal windows stay in their order.
     order.sort_by(|left, right| squares[*right].ratio().total_cmp(&squares[*left].ratio()));

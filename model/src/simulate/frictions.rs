@@ -255,7 +255,7 @@ impl Simulator<'_> {
         if self.direction[friction] == 0.0 {
             self.x[place * width..(place + 1) * width].fill(0.0);
         }
-        self.taken(inputs, row, instant.1)?;
+        self.finish_step(inputs, row, instant.1)?;
         Ok(length_s)
     }
 }

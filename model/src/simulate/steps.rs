@@ -123,7 +123,7 @@ impl Simulator<'_> {
             let Some(event) = self.event(inputs, (row, time_s), step_s) else {
                 self.keep(step_s);
                 core::mem::swap(&mut self.x, &mut self.tried);
-                return self.taken(inputs, row, ends_s);
+                return self.finish_step(inputs, row, ends_s);
             };
             time_s += self.switch(inputs, (row, time_s), step_s, event)?;
             step_s = ends_s - time_s;
@@ -213,7 +213,7 @@ impl Simulator<'_> {
                 time_s = if is_last { to_s } else { time_s + step_s };
                 self.keep(step_s);
                 core::mem::swap(&mut self.x, &mut self.tried);
-                self.taken(inputs, row, time_s)?;
+                self.finish_step(inputs, row, time_s)?;
                 if is_last {
                     return Ok(());
                 }
@@ -288,8 +288,13 @@ impl Simulator<'_> {
         }
     }
 
-    /// What follows a step: memories, sizes, and whether all is finite.
-    pub(super) fn taken(&mut self, inputs: &Inputs<'_>, row: usize, time_s: f64) -> Result<(), Failure> {
+    /// Finishes an accepted step: checks that all is finite, and renews sizes and memories.
+    pub(super) fn finish_step(
+        &mut self,
+        inputs: &Inputs<'_>,
+        row: usize,
+        time_s: f64,
+    ) -> Result<(), Failure> {
         let width = self.width();
         for place in 0..self.largest.len() {
             let value = self.x[place * width];

@@ -103,7 +103,7 @@ impl Experiment {
         let [length, hidden] = self.lengths_ms();
         let mut record = Record { rows: Vec::new(), inputs: Vec::new() };
         for k in 0..length {
-            let shown = plant.shown(&plant.truth(&Inputs::default()));
+            let shown = plant.noise_free_readings(&plant.truth(&Inputs::default()));
             let inputs = match (commands, self.kind) {
                 (Some(commands), Kind::Step) => commands[k],
                 _ => self.commands(k, &shown),

@@ -6,8 +6,8 @@
 //!
 //! Laws: the file of each effect. Scheme: the head of `integrator.rs`.
 
-use super::air::HeatAt;
-use super::flows::PortsAt;
+use super::air::HeatState;
+use super::flows::PortConditions;
 use super::friction::direction_of;
 use super::memory::{EffectStates, Memory, axis_conditions_at};
 use super::presliding::Bristle;
@@ -16,7 +16,7 @@ use super::tabulated::AxisConditions;
 use super::{AxisEffects, ChangedLaws, OpenBalance, act_in_no_step};
 use crate::faults::{Faults, Outlet};
 use crate::integrator::laws::{Baseline, Laws, StepContext};
-use crate::integrator::{HeldInputs, Integrator, Lanes, Middle};
+use crate::integrator::{HeldInputs, Integrator, Lanes, MidpointAir};
 use crate::lanes::{Axes, Choice, Mask, Pair};
 use crate::motion::{MotionSpan, Place, side};
 use crate::parameters::{LinkageParameters, RigParameters};
@@ -30,7 +30,7 @@ pub(crate) struct Effects {
     pub(crate) changed_laws: [ChangedLaws; 2],
     pub(crate) memory: Memory,
     /// Factors of the motion: for the two lengths of step and the directions of drive and load, to the middle and to the end.
-    pub(super) ways: [[[[MotionSpan; 2]; 2]; 2]; 2],
+    pub(super) motion_factors: [[[[MotionSpan; 2]; 2]; 2]; 2],
     pub(super) substep_s: f64,
     pub(super) stroke_m: f64,
     pub(super) temperature_k: f64,
@@ -64,7 +64,7 @@ impl Effects {
             memory: Memory::at_rest(&on, of, state),
             changed_laws: ChangedLaws::of(&on),
             on,
-            ways: [[[[of.spans()[0].motion_to_end; 2]; 2]; 2]; 2],
+            motion_factors: [[[[of.spans()[0].motion_to_end; 2]; 2]; 2]; 2],
             substep_s: of.substep_s(),
             stroke_m: rig.cylinder().stroke_m,
             temperature_k: rig.gas().temperature_k,
@@ -91,7 +91,7 @@ impl Effects {
         self.memory = Memory::at_rest(&self.on, of, state);
     }
 
-    /// What is broken in the laws from now on; [`Effects::move_with`] follows.
+    /// Sets the faults of the laws; [`Effects::move_with`] follows.
     pub(crate) fn set_faults(&mut self, faults: &Faults) {
         self.changed_laws = ChangedLaws::of(&self.on);
         for (axis, faults) in faults.axes.iter().enumerate() {
@@ -125,7 +125,7 @@ impl Effects {
     pub(crate) fn move_with(&mut self, of: &Integrator) {
         const DIRECTIONS: [f64; 2] = [1.0, -1.0];
         let viscous = |axis: usize, direction| self.viscous(of, axis, direction);
-        let ways = of.spans().map(|span| {
+        let motion_factors = of.spans().map(|span| {
             DIRECTIONS.map(|drive| {
                 DIRECTIONS.map(|load| {
                     let viscous = [viscous(0, drive), viscous(1, load)];
@@ -133,7 +133,7 @@ impl Effects {
                 })
             })
         });
-        self.ways = ways;
+        self.motion_factors = motion_factors;
     }
 
     pub(crate) fn begin_period(&mut self, command: [f64; 2]) {
@@ -164,12 +164,12 @@ impl Effects {
 
 impl Effects {
     /// The spools at the midpoint; those at the end are kept where effects move them.
-    fn spool_to_middle(&self, step: StepContext<'_>, extra_state: &mut EffectStates) -> Pair {
+    fn spool_to_middle(&self, step: StepContext<'_>, states: &mut EffectStates) -> Pair {
         let mut spools = step.spool_after(step.span.spool_to_middle).to_array();
         let (since_period_s, half_s) = (step.since_period_s(), step.span.span_s / 2.0);
         for (axis, spool) in spools.iter_mut().enumerate().filter(|(axis, _)| self.changed_laws[*axis].spool)
         {
-            let axis_states = &mut extra_state.axes[axis];
+            let axis_states = &mut states.axes[axis];
             if step.held.stuck[axis] {
                 (*spool, axis_states.spool_rate_per_s) = (step.from.spool.to_array()[axis], 0.0);
                 axis_states.spool = *spool;
@@ -187,8 +187,8 @@ impl Effects {
         &self,
         step: StepContext<'_>,
         spool: Pair,
-        extra_state: &mut EffectStates,
-        middle: &mut Middle,
+        states: &mut EffectStates,
+        middle: &mut MidpointAir,
     ) {
         let StepContext { of, span, from, node, .. } = step;
         let half_s = span.span_s / 2.0;
@@ -196,13 +196,13 @@ impl Effects {
         let extension = middle.extension;
         let volume = [of.chambers.volume_a(extension), of.chambers.volume_b(extension)];
         let volume_from = [of.chambers.volume_a(from.extension), of.chambers.volume_b(from.extension)];
-        let supply = SupplySide { supply_droop: extra_state.droop_pa + extra_state.droop_pa_per_s * half_s };
+        let supply = SupplySide { supply_droop: states.droop_pa + states.droop_pa_per_s * half_s };
         let mut pressure_pa = middle.pressure.map(Pair::to_array);
         let mut flow = middle.edge_flow.map(Pair::to_array);
         let mut drawn = 0.0;
         for axis in (0..2).filter(|axis| self.changed_laws[*axis].air) {
             let lane = |pair: Pair| pair.to_array()[axis];
-            let axis_states = &mut extra_state.axes[axis];
+            let axis_states = &mut states.axes[axis];
             let exhaust = ExhaustSide {
                 silencer_back_pressure: axis_states.silencer_pa + axis_states.silencer_pa_per_s * half_s,
             };
@@ -216,7 +216,7 @@ impl Effects {
             let ports = self.ports(
                 of,
                 axis,
-                &PortsAt {
+                &PortConditions {
                     spool: lane(spool),
                     supply_pa: supply.sum(node.middle_pa),
                     exhaust_pa: exhaust.sum(of.chambers.exhaust_pa()),
@@ -241,10 +241,10 @@ impl Effects {
             }
         }
         if let Some(effect) = self.on[0].supply_droop {
-            let before_pa = extra_state.droop_pa;
+            let before_pa = states.droop_pa;
             let after_pa = effect.advance(node.middle_pa + before_pa, node.middle_pa, drawn, span.span_s);
-            extra_state.droop_pa = after_pa - node.middle_pa;
-            extra_state.droop_pa_per_s = (extra_state.droop_pa - before_pa) / span.span_s;
+            states.droop_pa = after_pa - node.middle_pa;
+            states.droop_pa_per_s = (states.droop_pa - before_pa) / span.span_s;
         }
         middle.pressure = pressure_pa.map(|lanes| Pair::new(lanes[0], lanes[1]));
         middle.pneumatic = of.chambers.pneumatic_force(middle.pressure[0], middle.pressure[1]);
@@ -253,7 +253,7 @@ impl Effects {
 }
 
 /// Conditions of an axis in a step; speed and spool are those at its beginning.
-fn axis_conditions(step: StepContext<'_>, middle: &Middle, axis: usize) -> AxisConditions {
+fn axis_conditions(step: StepContext<'_>, middle: &MidpointAir, axis: usize) -> AxisConditions {
     let lane = |pair: Pair| pair.to_array()[axis];
     AxisConditions {
         extension_m: lane(middle.extension),
@@ -270,16 +270,16 @@ impl Laws for Effects {
         self.memory.states
     }
 
-    fn middle(&self, step: StepContext<'_>, extra_state: &mut EffectStates) -> Middle {
-        let spool = self.spool_to_middle(step, extra_state);
+    fn middle(&self, step: StepContext<'_>, states: &mut EffectStates) -> MidpointAir {
+        let spool = self.spool_to_middle(step, states);
         let mut middle = step.middle(spool);
         if self.changed_laws.iter().any(|laws| laws.air) {
-            self.pass_air(step, spool, extra_state, &mut middle);
+            self.pass_air(step, spool, states, &mut middle);
         }
         middle
     }
 
-    fn outside(&self, step: StepContext<'_>, middle: &Middle) -> Pair {
+    fn external_force(&self, step: StepContext<'_>, middle: &MidpointAir) -> Pair {
         let force = |axis: usize| {
             if self.changed_laws[axis].force {
                 self.force(axis, &axis_conditions(step, middle, axis)).sum(0.0)
@@ -301,8 +301,8 @@ impl Laws for Effects {
     fn sliding(
         &self,
         step: StepContext<'_>,
-        middle: &Middle,
-        extra_state: &EffectStates,
+        middle: &MidpointAir,
+        states: &EffectStates,
         push: Pair,
         moving: Mask,
     ) -> Pair {
@@ -311,7 +311,7 @@ impl Laws for Effects {
         }
         let of = step.of;
         let [drive, load] = [0, 1].map(|axis| {
-            let axis_states = &extra_state.axes[axis];
+            let axis_states = &states.axes[axis];
             let velocity = step.from.velocity.to_array()[axis];
             let push = push.to_array()[axis];
             let friction = self.friction(of, axis, middle, axis_states);
@@ -328,7 +328,7 @@ impl Laws for Effects {
         Pair::new(drive, load).where_true(moving)
     }
 
-    fn starting(&self, step: StepContext<'_>, middle: &Middle, force: Pair, starts: Mask) -> Pair {
+    fn starting(&self, step: StepContext<'_>, middle: &MidpointAir, force: Pair, starts: Mask) -> Pair {
         if self.baseline_friction {
             return Baseline.starting(step, middle, force, starts);
         }
@@ -342,7 +342,7 @@ impl Laws for Effects {
         Pair::new(drive, load).where_true(starts)
     }
 
-    fn break_away(&self, step: StepContext<'_>, middle: &Middle, force: Pair) -> Pair {
+    fn break_away(&self, step: StepContext<'_>, middle: &MidpointAir, force: Pair) -> Pair {
         if self.baseline_friction {
             return Baseline.break_away(step, middle, force);
         }
@@ -358,16 +358,17 @@ impl Laws for Effects {
         Pair::new(drive, load)
     }
 
-    fn ways<'s>(&'s self, step: StepContext<'s>) -> [&'s MotionSpan; 2] {
+    fn motion_factors<'s>(&'s self, step: StepContext<'s>) -> [&'s MotionSpan; 2] {
         if self.baseline_friction {
-            return Baseline.ways(step);
+            return Baseline.motion_factors(step);
         }
         let [drive, load] = step.from.velocity.to_array().map(side);
-        let [to_middle, to_end] = &self.ways[usize::from(step.span.span_s < self.substep_s)][drive][load];
+        let [to_middle, to_end] =
+            &self.motion_factors[usize::from(step.span.span_s < self.substep_s)][drive][load];
         [to_middle, to_end]
     }
 
-    fn holds(&self, step: StepContext<'_>, middle: &Middle, axis: usize, force: f64) -> bool {
+    fn holds(&self, step: StepContext<'_>, middle: &MidpointAir, axis: usize, force: f64) -> bool {
         if self.baseline_friction {
             return Baseline.holds(step, middle, axis, force);
         }
@@ -379,8 +380,8 @@ impl Laws for Effects {
     fn advance(
         &self,
         step: StepContext<'_>,
-        middle: &Middle,
-        extra_state: &mut EffectStates,
+        middle: &MidpointAir,
+        states: &mut EffectStates,
         axis: usize,
         force: f64,
     ) -> Place {
@@ -388,7 +389,7 @@ impl Laws for Effects {
             return Baseline.advance(step, middle, &mut (), axis, force);
         }
         let (of, start) = (step.of, step.from.place(axis));
-        let axis_states = &mut extra_state.axes[axis];
+        let axis_states = &mut states.axes[axis];
         let friction = self.friction(of, axis, middle, axis_states);
         let span_s = step.span.span_s;
         let Some(effect) = self.on[axis].presliding else {
@@ -404,7 +405,7 @@ impl Laws for Effects {
             .stop_at_ends(Place { extension: start.extension + way_m, velocity: bristle.velocity_m_per_s })
     }
 
-    fn air(&self, step: StepContext<'_>, to: &mut Lanes, middle: &Middle, extra_state: &mut EffectStates) {
+    fn air(&self, step: StepContext<'_>, to: &mut Lanes, middle: &MidpointAir, states: &mut EffectStates) {
         if !self.changed_laws.iter().any(|laws| laws.stored_air) {
             return;
         }
@@ -428,7 +429,7 @@ impl Laws for Effects {
                 let outlet = &self.outlets[axis][chamber];
                 *leakage += outlet.inflow(pressure_pa[chamber], of.atmospheric_pa, most);
             }
-            let axis_states = &mut extra_state.axes[axis];
+            let axis_states = &mut states.axes[axis];
             for chamber in 0..2 {
                 // What lag and bounds have let in, as a mean flow over the step.
                 let valve = (stored[chamber][axis] - lane(from.air()[chamber].stored)) / (normal_pa * span_s);
@@ -438,7 +439,7 @@ impl Laws for Effects {
                     of,
                     axis,
                     chamber,
-                    HeatAt {
+                    HeatState {
                         stored_j: pressure_pa[chamber] * volume_m3,
                         volume_m3,
                         normal_volume_m3: axis_states.normal_volume_m3[chamber]
@@ -458,17 +459,17 @@ impl Laws for Effects {
         (to.air_a.stored, to.air_b.stored) = (a, b);
     }
 
-    fn spool(&self, step: StepContext<'_>, extra_state: &EffectStates) -> Pair {
+    fn spool(&self, step: StepContext<'_>, states: &EffectStates) -> Pair {
         let baseline = step.spool_after(step.span.spool_to_end).to_array();
         let spool = |axis: usize| {
-            if self.changed_laws[axis].spool { extra_state.axes[axis].spool } else { baseline[axis] }
+            if self.changed_laws[axis].spool { states.axes[axis].spool } else { baseline[axis] }
         };
         Pair::new(spool(0), spool(1))
     }
 
-    fn keep(&mut self, of: &Integrator, held: HeldInputs, lanes: &Lanes, extra_state: &EffectStates) {
+    fn keep(&mut self, of: &Integrator, held: HeldInputs, lanes: &Lanes, states: &EffectStates) {
         let span_s = self.substep_s;
-        self.memory.states = *extra_state;
+        self.memory.states = *states;
         self.memory.substeps += 1;
         self.see_forces(of, lanes, held.hand, held.linked);
         for axis in 0..2 {

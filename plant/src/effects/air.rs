@@ -2,16 +2,16 @@
 
 use super::OpenBalance;
 use super::acting::Effects;
-use super::flows::{Ports, PortsAt};
+use super::flows::{PortConditions, Ports};
 use super::heat_exchange::{ChamberHeat, wetted_m2};
 use super::memory::EffectStates;
 use super::sums::{AirRate, ExhaustSide, Leakage, LineFlow, SupplySide};
 use super::tabulated::AxisConditions;
 use crate::integrator::Integrator;
 use crate::state::State;
-use crate::truth::AirAt;
+use crate::truth::AirState;
 
-pub(crate) struct HeatAt {
+pub(crate) struct HeatState {
     pub(crate) stored_j: f64,
     pub(crate) volume_m3: f64,
     pub(crate) normal_volume_m3: f64,
@@ -24,13 +24,13 @@ impl Effects {
         SupplySide { supply_droop: states.droop_pa }
     }
 
-    pub(crate) fn ports_at(&self, of: &Integrator, axis: usize, state: &State, air: &AirAt) -> Ports {
+    pub(crate) fn ports_at(&self, of: &Integrator, axis: usize, state: &State, air: &AirState) -> Ports {
         let states = &self.memory.states;
         let exhaust = ExhaustSide { silencer_back_pressure: states.axes[axis].silencer_pa };
         self.ports(
             of,
             axis,
-            &PortsAt {
+            &PortConditions {
                 spool: state.axes[axis].spool,
                 supply_pa: self.supply_side(states).sum(state.supply_pressure_pa),
                 exhaust_pa: exhaust.sum(of.chambers.exhaust_pa()),
@@ -68,7 +68,7 @@ impl Effects {
         of: &Integrator,
         axis: usize,
         chamber: usize,
-        heat: HeatAt,
+        heat: HeatState,
         span_s: f64,
     ) -> AirRate {
         let heat_exchange = self.on[axis].heat_exchange.map_or(0.0, |effect| {

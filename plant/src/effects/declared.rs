@@ -264,9 +264,9 @@ impl Declared {
     }
 }
 
-/// What expressions are over, at an instant of an axis.
+/// Values of an axis at an instant that expressions of terms read.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct DeclaredAt<'a> {
+pub(crate) struct TermInputs<'a> {
     pub(crate) conditions: &'a AxisConditions,
     pub(crate) command: f64,
     pub(crate) time_s: f64,
@@ -276,7 +276,7 @@ pub(crate) struct DeclaredAt<'a> {
     pub(crate) kept: &'a [f64],
 }
 
-impl DeclaredAt<'_> {
+impl TermInputs<'_> {
     /// In the order of [`VARIABLES`].
     pub(super) fn values(&self) -> [f64; VARIABLES.len()] {
         let AxisConditions { extension_m, velocity_m_per_s, spool, pressure_pa: [a, b] } = *self.conditions;
@@ -365,12 +365,12 @@ impl DeclaredTerms {
     }
 
     /// Force along the axis's extension, N.
-    pub(crate) fn force(&self, at: &DeclaredAt<'_>) -> f64 {
+    pub(crate) fn force(&self, at: &TermInputs<'_>) -> f64 {
         self.sum(Target::Force, at).clamp(-MOST_FORCE_N, MOST_FORCE_N)
     }
 
     /// Flow into a chamber, m^3/s.
-    pub(crate) fn flow(&self, chamber: usize, at: &DeclaredAt<'_>) -> f64 {
+    pub(crate) fn flow(&self, chamber: usize, at: &TermInputs<'_>) -> f64 {
         let most = Unit::NormalLitrePerMinute.to_si(MOST_FLOW_NL_PER_MIN);
         let flow = self.sum([Target::FlowA, Target::FlowB][chamber], at) / self.kg_per_m3;
         let pressure_pa = at.conditions.pressure_pa[chamber];
@@ -378,11 +378,11 @@ impl DeclaredTerms {
     }
 
     /// What a sensor shows beside the truth, in SI.
-    pub(crate) fn reading(&self, target: Target, at: &DeclaredAt<'_>) -> f64 {
+    pub(crate) fn reading(&self, target: Target, at: &TermInputs<'_>) -> f64 {
         self.sum(target, at)
     }
 
-    fn sum(&self, target: Target, at: &DeclaredAt<'_>) -> f64 {
+    fn sum(&self, target: Target, at: &TermInputs<'_>) -> f64 {
         let mut sum = 0.0;
         for term in self.terms.iter().filter(|term| term.target == target) {
             sum += value(&term.formula, &at.values(), &at.kept[term.kept.clone()]);

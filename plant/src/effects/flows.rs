@@ -23,9 +23,9 @@ const SEARCH_STEPS: usize = 40;
 /// Where the search ends, as a share of the flow without drops: far below what a sensor's step could show.
 const SEARCH_SHARE: f64 = 1e-12;
 
-/// What the flows of an axis depend on.
+/// Values that the flows of an axis depend on.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct PortsAt {
+pub(crate) struct PortConditions {
     pub(crate) spool: f64,
     pub(crate) supply_pa: f64,
     pub(crate) exhaust_pa: f64,
@@ -55,14 +55,14 @@ pub(crate) struct Ports {
 
 /// One chamber's two edges: conductances and the pressures behind them, supply and exhaust.
 #[derive(Clone, Copy)]
-struct Pipes {
+struct ChamberEdges {
     conductance: [f64; 2],
     far_pa: [f64; 2],
 }
 
 impl Effects {
     /// Flows of an axis at its two ports.
-    pub(crate) fn ports(&self, of: &Integrator, axis: usize, at: &PortsAt) -> Ports {
+    pub(crate) fn ports(&self, of: &Integrator, axis: usize, at: &PortConditions) -> Ports {
         let on = &self.on[axis];
         let opening = Opening {
             valve_dead_zone: on.valve_dead_zone.map_or(0.0, |effect| effect.term(at.spool)),
@@ -89,7 +89,7 @@ impl Effects {
         for chamber in 0..2 {
             // s > 0: supply to a, b to exhaust.
             let connected = usize::from((spool > 0.0) != (chamber == 0));
-            let mut pipes = Pipes { conductance: [0.0; 2], far_pa: [at.supply_pa, at.exhaust_pa] };
+            let mut pipes = ChamberEdges { conductance: [0.0; 2], far_pa: [at.supply_pa, at.exhaust_pa] };
             for edge in 0..2 {
                 let kv_open = if edge == connected { kv[edge] } else { 0.0 };
                 let floor = on.valve_null_leakage.map_or(0.0, |effect| effect.term(kv_open, kv_max[edge]));
@@ -122,7 +122,7 @@ impl Effects {
     }
 
     /// Pressure at a port through which nothing passes, Pa: where leakage from the supply leaves for the exhaust.
-    fn shut_port_pa(&self, axis: usize, pipes: &Pipes, chamber_pa: f64) -> f64 {
+    fn shut_port_pa(&self, axis: usize, pipes: &ChamberEdges, chamber_pa: f64) -> f64 {
         if pipes.conductance.contains(&0.0) {
             // One edge at most: the port takes the pressure behind it, and then that edge passes nothing either.
             return (0..2)
@@ -143,7 +143,7 @@ impl Effects {
     }
 
     /// Flow of an edge by eq. (4), and what effects add to it.
-    fn edge(&self, axis: usize, pipes: &Pipes, edge: usize, port_pa: f64) -> (PortFlow, f64) {
+    fn edge(&self, axis: usize, pipes: &ChamberEdges, edge: usize, port_pa: f64) -> (PortFlow, f64) {
         let (conductance, far_pa) = (pipes.conductance[edge], pipes.far_pa[edge]);
         if conductance == 0.0 {
             return (PortFlow::default(), 0.0);
@@ -176,7 +176,7 @@ impl Effects {
     fn through(
         &self,
         axis: usize,
-        pipes: &Pipes,
+        pipes: &ChamberEdges,
         unresisted: [(PortFlow, f64); 2],
         chamber_pa: f64,
         to_end_m: f64,

@@ -5,10 +5,10 @@ use super::acting::Effects;
 use super::memory::AxisEffectStates;
 use super::presliding::{Bristle, BristleLoad};
 use super::sums::{BreakAwayLevel, Bristles, SlidingLevel, Viscous};
-use crate::integrator::{Integrator, Middle};
+use crate::integrator::{Integrator, MidpointAir};
 use crate::lanes::Axes;
 use crate::motion::{Levels, Place, side};
-use crate::truth::AirAt;
+use crate::truth::AirState;
 
 /// Values that the friction levels depend on, besides the speed.
 #[derive(Debug, Clone, Copy)]
@@ -57,7 +57,7 @@ impl Effects {
         &'a self,
         of: &'a Integrator,
         axis: usize,
-        middle: &Middle,
+        middle: &MidpointAir,
         axis_states: &AxisEffectStates,
     ) -> Friction<'a> {
         let pressure_pa = middle.pressure.map(|pair| pair.to_array()[axis]);
@@ -76,7 +76,7 @@ impl<'a> Friction<'a> {
         of: &'a Integrator,
         axis: usize,
         place: Place,
-        air: &AirAt,
+        air: &AirState,
     ) -> Self {
         let conditions = FrictionConditions {
             extension_m: place.extension,

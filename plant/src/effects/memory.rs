@@ -4,7 +4,7 @@
 //! histories grow only when a substep counts. All room is taken at construction: a step allocates nothing.
 
 use super::AxisEffects;
-use super::declared::DeclaredAt;
+use super::declared::TermInputs;
 use super::tabulated::AxisConditions;
 use crate::integrator::{Integrator, Lanes, PERIOD_S};
 use crate::lanes::{Axes, Pair};
@@ -189,7 +189,7 @@ impl Memory {
         let declared = [0, 1].map(|i: usize| {
             let (conditions, command) = (axis_conditions_at(of, &lanes, i), axes[i].spool);
             let at =
-                DeclaredAt { conditions: &conditions, command, time_s: 0.0, sensor_force_n: 0.0, kept: &[] };
+                TermInputs { conditions: &conditions, command, time_s: 0.0, sensor_force_n: 0.0, kept: &[] };
             on[i].declared.begin(&at.values())
         });
         Memory {

@@ -2,7 +2,7 @@
 
 use super::OpenBalance;
 use super::acting::Effects;
-use super::declared::{DeclaredAt, Target};
+use super::declared::{Target, TermInputs};
 use super::memory::axis_conditions_at;
 use super::sums::{ForceReading, PositionReading, PressureReading};
 use super::tabulated::AxisConditions;
@@ -18,7 +18,7 @@ impl Effects {
     }
 
     /// Terms of the position reading of an axis, by its true position, m.
-    pub(crate) fn position_reading(&self, axis: usize, truth: f64, at: &DeclaredAt<'_>) -> PositionReading {
+    pub(crate) fn position_reading(&self, axis: usize, truth: f64, at: &TermInputs<'_>) -> PositionReading {
         let on = &self.on[axis];
         PositionReading {
             time_skew: self.skew(axis, 0, truth),
@@ -33,7 +33,7 @@ impl Effects {
     }
 
     /// Terms of the force reading of an axis, by what its sensor should show, N.
-    pub(crate) fn force_reading(&self, axis: usize, truth: f64, at: &DeclaredAt<'_>) -> ForceReading {
+    pub(crate) fn force_reading(&self, axis: usize, truth: f64, at: &TermInputs<'_>) -> ForceReading {
         let on = &self.on[axis];
         ForceReading {
             time_skew: self.skew(axis, 1, truth),
@@ -50,7 +50,7 @@ impl Effects {
         axis: usize,
         chamber: usize,
         truth: f64,
-        at: &DeclaredAt<'_>,
+        at: &TermInputs<'_>,
     ) -> PressureReading {
         let on = &self.on[axis];
         PressureReading {

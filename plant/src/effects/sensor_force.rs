@@ -3,7 +3,7 @@
 //! Why not those of the same instant: `declared.rs`.
 
 use super::acting::Effects;
-use super::declared::DeclaredAt;
+use super::declared::TermInputs;
 use super::memory::axis_conditions_at;
 use super::tabulated::AxisConditions;
 use crate::integrator::{Integrator, Lanes};
@@ -20,12 +20,12 @@ impl Effects {
         }
     }
 
-    /// What declared terms of a force, of a flow and of what is kept are over.
+    /// Inputs of declared terms of a force or a flow, and of their memory variables.
     pub(crate) fn declared_in_step<'a>(
         &'a self,
         axis: usize,
         conditions: &'a AxisConditions,
-    ) -> DeclaredAt<'a> {
+    ) -> TermInputs<'a> {
         self.declared_at(axis, conditions, self.memory.sensor_force_n[axis])
     }
 
@@ -37,15 +37,15 @@ impl Effects {
         }
     }
 
-    /// What declared terms are over.
+    /// Inputs of declared terms.
     pub(crate) fn declared_at<'a>(
         &'a self,
         axis: usize,
         conditions: &'a AxisConditions,
         sensor_force_n: f64,
-    ) -> DeclaredAt<'a> {
+    ) -> TermInputs<'a> {
         let command = self.memory.commands[axis].newest();
         let time_s = self.memory.substeps as f64 * self.substep_s;
-        DeclaredAt { conditions, command, time_s, sensor_force_n, kept: &self.memory.declared[axis] }
+        TermInputs { conditions, command, time_s, sensor_force_n, kept: &self.memory.declared[axis] }
     }
 }

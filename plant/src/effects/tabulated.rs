@@ -24,7 +24,7 @@ use crate::lanes::Axes;
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::state::{Axis, AxisState};
-use crate::truth::{AirAt, AxisTruth};
+use crate::truth::{AirState, AxisTruth};
 use std::fmt::Write as _;
 
 /// Fewest and most points of a table.
@@ -226,7 +226,7 @@ pub(crate) struct AxisConditions {
 
 impl AxisConditions {
     /// At the instant of a state.
-    pub(crate) fn at(lanes: &Lanes, air: &AirAt, axis: usize) -> Self {
+    pub(crate) fn at(lanes: &Lanes, air: &AirState, axis: usize) -> Self {
         let place = lanes.place(axis);
         AxisConditions {
             extension_m: place.extension,

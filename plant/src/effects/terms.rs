@@ -5,7 +5,7 @@
 
 use super::OpenBalance;
 use super::acting::Effects;
-use super::air::HeatAt;
+use super::air::HeatState;
 use super::friction::{Friction, direction_of};
 use super::replaced::linkage_terms;
 use super::sheet::{Element, Part};
@@ -15,7 +15,7 @@ use super::tabulated::AxisConditions;
 use crate::integrator::{Integrator, Lanes};
 use crate::lanes::{Axes, Pair};
 use crate::state::{Inputs, State};
-use crate::truth::{AirAt, TrueForces, hand_forces};
+use crate::truth::{AirState, TrueForces, hand_forces};
 
 /// Terms that a rig with everything switched on has, and some room.
 const MOST_TERMS: usize = 160;
@@ -112,7 +112,7 @@ impl Effects {
         visit: &mut dyn FnMut(Term),
     ) {
         let lanes = Lanes::load(state);
-        let air = AirAt::of(of, &lanes);
+        let air = AirState::of(of, &lanes);
         let forces = TrueForces::at(of, Some(self), &lanes, hand_forces(inputs), state.linked);
         for (axis, part) in [Part::Drive, Part::Load].into_iter().enumerate() {
             let mut visitor = TermVisitor { effects: self, part, visit };
@@ -156,7 +156,7 @@ impl Effects {
                     at,
                     &OpenBalance::Leakage { chamber, conditions: &conditions },
                 );
-                let heat = HeatAt {
+                let heat = HeatState {
                     stored_j: lane(lanes.air()[chamber].stored),
                     volume_m3: lane(air.volume[chamber]),
                     normal_volume_m3: axis_states.normal_volume_m3[chamber],

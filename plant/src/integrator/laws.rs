@@ -4,7 +4,7 @@
 //! by the baseline's own formula, so a rig without effects pays nothing for their being possible; a hash of bits and a count
 //! of instructions hold that down. `effects/acting.rs` is the other answer.
 
-use super::{HeldInputs, Integrator, Lanes, Middle, Node, Span};
+use super::{HeldInputs, Integrator, Lanes, MidpointAir, Node, Span};
 use crate::chamber::Air;
 use crate::lanes::{Axes, Pair};
 use crate::motion::{MotionSpan, Place, against};
@@ -45,7 +45,7 @@ impl<P: Axes> StepContext<'_, P> {
 
     /// The baseline's air and flows at the midpoint, with the spools there.
     #[inline(always)]
-    pub(crate) fn middle(&self, spool: P) -> Middle<P> {
+    pub(crate) fn middle(&self, spool: P) -> MidpointAir<P> {
         let StepContext { of, span, from, node, .. } = *self;
         let mut edges = of.valve.edges(spool, node.middle_pa, of.chambers.exhaust_pa());
         if node.shut {
@@ -56,7 +56,7 @@ impl<P: Axes> StepContext<'_, P> {
         let per_volume_b = of.chambers.volume_b(extension).reciprocal();
         let pressure_a = span.lag.midpoint_air(from.air_a) * per_volume_a;
         let pressure_b = span.lag.midpoint_air(from.air_b) * per_volume_b;
-        Middle {
+        MidpointAir {
             extension,
             pneumatic: of.chambers.pneumatic_force(pressure_a, pressure_b),
             edge_flow: [
@@ -78,10 +78,10 @@ pub(crate) trait Laws<P: Axes = Pair> {
     fn extra_state(&self) -> Self::ExtraState;
 
     /// Air and flows at the midpoint of a step.
-    fn middle(&self, step: StepContext<'_, P>, extra_state: &mut Self::ExtraState) -> Middle<P>;
+    fn middle(&self, step: StepContext<'_, P>, extra_state: &mut Self::ExtraState) -> MidpointAir<P>;
 
-    /// Forces from outside on each piston, N: the hand's and what else there is.
-    fn outside(&self, step: StepContext<'_, P>, middle: &Middle<P>) -> P;
+    /// External force on each piston, N: the hand's and that of effects.
+    fn external_force(&self, step: StepContext<'_, P>, middle: &MidpointAir<P>) -> P;
 
     /// Which axes move, for the laws of friction.
     fn moving(&self, step: StepContext<'_, P>) -> P::Mask;
@@ -93,29 +93,29 @@ pub(crate) trait Laws<P: Axes = Pair> {
     fn sliding(
         &self,
         step: StepContext<'_, P>,
-        middle: &Middle<P>,
+        middle: &MidpointAir<P>,
         extra_state: &Self::ExtraState,
         push: P,
         moving: P::Mask,
     ) -> P;
 
     /// Friction on axes that this force sets in motion, N, signed.
-    fn starting(&self, step: StepContext<'_, P>, middle: &Middle<P>, force: P, starts: P::Mask) -> P;
+    fn starting(&self, step: StepContext<'_, P>, middle: &MidpointAir<P>, force: P, starts: P::Mask) -> P;
 
     /// Break-away force in the direction of a force, N.
-    fn break_away(&self, step: StepContext<'_, P>, middle: &Middle<P>, force: P) -> P;
+    fn break_away(&self, step: StepContext<'_, P>, middle: &MidpointAir<P>, force: P) -> P;
 
     /// Factors of the motion to the middle and to the end of a step.
-    fn ways<'s>(&'s self, step: StepContext<'s, P>) -> [&'s MotionSpan<P>; 2];
+    fn motion_factors<'s>(&'s self, step: StepContext<'s, P>) -> [&'s MotionSpan<P>; 2];
 
     /// Whether a resting axis stays under this force, N without any friction.
-    fn holds(&self, step: StepContext<'_, P>, middle: &Middle<P>, axis: usize, force: f64) -> bool;
+    fn holds(&self, step: StepContext<'_, P>, middle: &MidpointAir<P>, axis: usize, force: f64) -> bool;
 
     /// Moves one axis through a step under a held force, N without any friction.
     fn advance(
         &self,
         step: StepContext<'_, P>,
-        middle: &Middle<P>,
+        middle: &MidpointAir<P>,
         extra_state: &mut Self::ExtraState,
         axis: usize,
         force: f64,
@@ -126,7 +126,7 @@ pub(crate) trait Laws<P: Axes = Pair> {
         &self,
         step: StepContext<'_, P>,
         to: &mut Lanes<P>,
-        middle: &Middle<P>,
+        middle: &MidpointAir<P>,
         extra_state: &mut Self::ExtraState,
     );
 
@@ -153,12 +153,12 @@ impl<P: Axes> Laws<P> for Baseline {
     fn extra_state(&self) {}
 
     #[inline(always)]
-    fn middle(&self, step: StepContext<'_, P>, (): &mut ()) -> Middle<P> {
+    fn middle(&self, step: StepContext<'_, P>, (): &mut ()) -> MidpointAir<P> {
         step.middle(step.spool_after(step.span.spool_to_middle))
     }
 
     #[inline(always)]
-    fn outside(&self, step: StepContext<'_, P>, _: &Middle<P>) -> P {
+    fn external_force(&self, step: StepContext<'_, P>, _: &MidpointAir<P>) -> P {
         step.held.hand
     }
 
@@ -173,27 +173,27 @@ impl<P: Axes> Laws<P> for Baseline {
     }
 
     #[inline(always)]
-    fn sliding(&self, step: StepContext<'_, P>, _: &Middle<P>, (): &(), _: P, moving: P::Mask) -> P {
+    fn sliding(&self, step: StepContext<'_, P>, _: &MidpointAir<P>, (): &(), _: P, moving: P::Mask) -> P {
         against(step.from.velocity, P::both(step.of.motion.levels.sliding_n[0]), moving)
     }
 
     #[inline(always)]
-    fn starting(&self, step: StepContext<'_, P>, _: &Middle<P>, force: P, starts: P::Mask) -> P {
+    fn starting(&self, step: StepContext<'_, P>, _: &MidpointAir<P>, force: P, starts: P::Mask) -> P {
         against(force, P::both(step.of.motion.levels.sliding_n[0]), starts)
     }
 
     #[inline(always)]
-    fn break_away(&self, step: StepContext<'_, P>, _: &Middle<P>, _: P) -> P {
+    fn break_away(&self, step: StepContext<'_, P>, _: &MidpointAir<P>, _: P) -> P {
         P::both(step.of.motion.levels.break_away_n[0])
     }
 
     #[inline(always)]
-    fn ways<'s>(&'s self, step: StepContext<'s, P>) -> [&'s MotionSpan<P>; 2] {
+    fn motion_factors<'s>(&'s self, step: StepContext<'s, P>) -> [&'s MotionSpan<P>; 2] {
         [&step.span.motion_to_middle, &step.span.motion_to_end]
     }
 
     #[inline(always)]
-    fn holds(&self, step: StepContext<'_, P>, _: &Middle<P>, axis: usize, force: f64) -> bool {
+    fn holds(&self, step: StepContext<'_, P>, _: &MidpointAir<P>, axis: usize, force: f64) -> bool {
         step.of.motion.holds(step.from.place(axis).extension, force, step.of.motion.levels.break_away_n[0])
     }
 
@@ -201,7 +201,7 @@ impl<P: Axes> Laws<P> for Baseline {
     fn advance(
         &self,
         step: StepContext<'_, P>,
-        _: &Middle<P>,
+        _: &MidpointAir<P>,
         (): &mut (),
         axis: usize,
         force: f64,
@@ -211,7 +211,7 @@ impl<P: Axes> Laws<P> for Baseline {
     }
 
     #[inline(always)]
-    fn air(&self, _: StepContext<'_, P>, _: &mut Lanes<P>, _: &Middle<P>, (): &mut ()) {}
+    fn air(&self, _: StepContext<'_, P>, _: &mut Lanes<P>, _: &MidpointAir<P>, (): &mut ()) {}
 
     #[inline(always)]
     fn spool(&self, step: StepContext<'_, P>, (): &()) -> P {

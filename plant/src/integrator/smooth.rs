@@ -62,22 +62,22 @@ impl<P: Axes> Integrator<P> {
         let middle = laws.middle(step, extra_state);
 
         let moving = laws.moving(step);
-        let hand = laws.outside(step, &middle);
+        let hand = laws.external_force(step, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
             hand,
             sliding_friction: laws.sliding(step, &middle, extra_state, middle.pneumatic + hand, moving),
             contact: zero,
         };
-        let [to_middle, way] = laws.ways(step);
+        let [to_middle, to_end] = laws.motion_factors(step);
         if held.linked {
             let kinematics = self.kinematics(span, to_middle, &from, moving, &forces);
             forces.contact = P::both(self.linkage.midpoint_force(kinematics));
         }
         let force = forces.sum();
-        let mut velocity = (way.keep * from.velocity + way.gain * force).where_true(moving);
+        let mut velocity = (to_end.keep * from.velocity + to_end.gain * force).where_true(moving);
         let mut extension =
-            from.extension + (way.drift * from.velocity + way.push * force).where_true(moving);
+            from.extension + (to_end.drift * from.velocity + to_end.push * force).where_true(moving);
         let mut sticks = None;
         if laws.on_bristles() != [false; 2] {
             let unresisted = forces.pneumatic + forces.hand + forces.contact;

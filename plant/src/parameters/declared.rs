@@ -230,7 +230,7 @@ impl Reader<'_> {
         if numbers.len() > MOST_PARAMETERS {
             return Err(section.wrong(&format!("more than {MOST_PARAMETERS} names under parameters")));
         }
-        let kept = self.named(&mut section, "memory", MOST_REMEMBERED, Self::kept)?;
+        let kept = self.named(&mut section, "memory", MOST_REMEMBERED, Self::memory_variable)?;
         let mut curves = tables(&mut section, self.source)?;
         let others: Vec<Table> = self
             .of_file
@@ -354,7 +354,7 @@ impl Reader<'_> {
     }
 
     /// What the term keeps, its expressions as they are written.
-    fn kept(&self, name: String, mut section: Section<'_>) -> Result<MemoryText> {
+    fn memory_variable(&self, name: String, mut section: Section<'_>) -> Result<MemoryText> {
         let unit = self.unit(&mut section)?;
         let range = match section.numbers("range")?.as_slice() {
             [least, most] if least < most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],

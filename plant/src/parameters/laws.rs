@@ -152,11 +152,11 @@ fn numbers(
         let table = given.as_mut().map(|given| given.section(&number.name)).transpose()?.flatten();
         let read = match table {
             Some(mut table) => {
-                let read = one(number, Some((&mut table, source)))?;
+                let read = read_number(number, Some((&mut table, source)))?;
                 table.finish()?;
                 read
             }
-            None => one(number, None)?,
+            None => read_number(number, None)?,
         };
         let read = read.map_err(|why| section.wrong(&format!("parameters.{}.{why}", number.name)))?;
         if number.is_fixed {
@@ -178,7 +178,10 @@ fn numbers(
 }
 
 /// A number of a library with what the file has in place of it, or what is missing.
-fn one(number: &LawNumber, table: Option<(&mut Section<'_>, &Source<'_>)>) -> Result<Result<Number, String>> {
+fn read_number(
+    number: &LawNumber,
+    table: Option<(&mut Section<'_>, &Source<'_>)>,
+) -> Result<Result<Number, String>> {
     let usual = Unit::parse(&number.unit).unwrap_or_else(|_| Unit::one());
     let (mut unit, mut values, mut ends, mut priors) = (usual.clone(), Vec::new(), Vec::new(), Vec::new());
     if let Some((table, source)) = table {

@@ -119,7 +119,7 @@ impl Add for HandForces {
 
 /// A hand in the course of a run.
 #[derive(Debug, Clone)]
-pub(super) struct HandAtWork {
+pub(super) struct ActiveHand {
     hand: Hand,
     from: u64,
     to: u64,
@@ -127,9 +127,9 @@ pub(super) struct HandAtWork {
     x_from_m: Option<f64>,
 }
 
-impl HandAtWork {
+impl ActiveHand {
     pub(super) fn new(hand: Hand) -> Self {
-        HandAtWork { hand, from: cycle_of(hand.from_s), to: cycle_of(hand.to_s), x_from_m: None }
+        ActiveHand { hand, from: cycle_of(hand.from_s), to: cycle_of(hand.to_s), x_from_m: None }
     }
 
     pub(super) fn part(&self) -> Part {

@@ -7,7 +7,7 @@
 //!
 //! It is called once for every cycle, in order, also for those that a late loop makes up for. Nothing here allocates.
 
-use super::hand::HandAtWork;
+use super::hand::ActiveHand;
 use super::stop::{RigCall, StopHolder, StopHolders};
 use super::{Action, Event, HandForces, Scene, cycle_of};
 use crate::plant::Plant;
@@ -15,7 +15,7 @@ use crate::plant::Plant;
 /// A scene in its course: forces and actions of each cycle, not yet done to any plant.
 #[derive(Debug, Clone)]
 pub struct Script {
-    hands: Vec<HandAtWork>,
+    hands: Vec<ActiveHand>,
     /// In the order of their times; those of one time in the order of the file.
     events: Vec<Event>,
     next: usize,
@@ -27,7 +27,7 @@ impl Script {
     pub fn new(scene: &Scene) -> Self {
         let mut events = scene.event.clone();
         events.sort_by_key(|event| cycle_of(event.at_s));
-        Script { hands: scene.hand.iter().copied().map(HandAtWork::new).collect(), events, next: 0 }
+        Script { hands: scene.hand.iter().copied().map(ActiveHand::new).collect(), events, next: 0 }
     }
 
     /// The next event that is due by `cycle`; to be asked until there is none.

@@ -78,7 +78,7 @@ pub(crate) fn fitted(made: &Record, hidden: &Hidden) -> Result<NearestLaw, Compu
     let observer = Observer::new(trajectory(made, &rig));
     let observed = observer.observed(made);
     let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
-    let candidate = Candidate::beside(&rig, sheet, hidden.place);
+    let candidate = Candidate::in_rig(&rig, sheet, hidden.place);
     let start = (0..sheet.keys.len()).map(|key| candidate.coordinate(key, hidden.numbers[key])).collect();
     let whole = length(&observer.between(&observed, observer.baseline())).powi(2);
     let fit = Fit { observer: &observer, observed: &observed, candidate, rig: &rig, priors: &[] };

@@ -171,7 +171,7 @@ impl Observer {
         let mut phases = [Vec::with_capacity(WINDOW + 1), Vec::with_capacity(WINDOW + 1)];
         for inputs in &self.trajectory.inputs[window * WINDOW..][..WINDOW] {
             let truth = plant.truth(inputs);
-            let shown = plant.shown(&truth);
+            let shown = plant.noise_free_readings(&truth);
             for i in measured() {
                 run.readings.extend(shown[i].iter().zip(self.noise).map(|(value, noise)| value / noise));
                 phases[i].push(phase(&truth, i));

@@ -10,7 +10,7 @@ use plant::RigParameters;
 
 const PERIODS: usize = 6000;
 
-fn made(rig: &RigParameters, seed: u64) -> [GriddedRecord; 1] {
+fn synthetic_record(rig: &RigParameters, seed: u64) -> [GriddedRecord; 1] {
     [record_over(PERIODS, rig, &RigParameters::baseline(), seed)]
 }
 
@@ -73,7 +73,7 @@ fn a_fifth_of_the_windows_at_most_is_left_out() {
 
 #[test]
 fn what_best_fits_noise_is_not_significant_and_neither_is_a_gain_of_the_best_windows() {
-    let records = made(&RigParameters::baseline(), 5);
+    let records = synthetic_record(&RigParameters::baseline(), 5);
     let case = Case::new(&records);
     let mut model = case.fitted(None);
     let tests = case.significance(&model, &[]);
@@ -94,7 +94,7 @@ fn what_best_fits_noise_is_not_significant_and_neither_is_a_gain_of_the_best_win
 
 #[test]
 fn a_strong_effect_is_significant_after_five_draws_with_any_number_of_threads() {
-    let records = made(&inclined(), 5);
+    let records = synthetic_record(&inclined(), 5);
     let case = Case::new(&records);
     let [model, other] = ["inclination", "dead-volume"].map(|name| case.fitted(Some(name)));
     let explanations = [&model, &other].map(|fit| Explanation {

@@ -231,7 +231,7 @@ impl Window {
         for (k, (inputs, solved)) in self.inputs.iter().zip(&self.solved).enumerate() {
             plant.step(inputs);
             let truth = plant.truth(inputs);
-            let shown = plant.shown(&truth);
+            let shown = plant.noise_free_readings(&truth);
             let terms = plant.terms(inputs);
             for axis in 0..2 {
                 let part = ["drive", "load"][axis];
