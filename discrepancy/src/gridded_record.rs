@@ -88,7 +88,7 @@ impl AxisState {
     pub(crate) const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
 
     /// The state with one of its values nudged, in the order of [`AxisState::NUDGES`].
-    pub(crate) fn nudged(mut self, number: usize) -> Self {
+    pub(crate) fn perturbed(mut self, number: usize) -> Self {
         let value = match number {
             0 => &mut self.extension_m,
             1 => &mut self.rod_velocity_m_per_s,

@@ -47,12 +47,12 @@ pub(crate) fn page(
         (
             "held-out",
             "On held-out records",
-            left("Held-out records", &report.held_out) + &alternatives(report),
+            residual_table("Held-out records", &report.held_out) + &alternatives(report),
         ),
         (
             "training",
             "On the training records",
-            left("Training records", &report.training) + &residuals(&report.residuals),
+            residual_table("Training records", &report.training) + &residuals(&report.residuals),
         ),
         ("suspects", "Suspects, the most likely first", suspects(&report.suspects)),
         ("parameters", "Numbers of the model", numbers(&report.parameters)),

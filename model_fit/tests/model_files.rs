@@ -199,7 +199,7 @@ fn two_suspects_with_the_same_law_cannot_be_told_apart() {
         [other.instead_of.as_str(), other.suspect.as_str()],
         [&report.named[0].suspect, &report.named[0].alternatives[0]]
     );
-    assert!((other.left.rms_after / report.held_out[0].rms_after - 1.0).abs() < 1e-2, "{other:?}");
+    assert!((other.residual.rms_after / report.held_out[0].rms_after - 1.0).abs() < 1e-2, "{other:?}");
     // Structure says so before any of them is fitted.
     assert!(report.structure.twins.iter().any(|twins| twins.suspects == ["cubic-stiffness", "cubic-too"]));
     let train = [folder.path().join("train.csv")];

@@ -223,17 +223,17 @@ impl<'a> Observer<'a> {
             for number in 0..AxisState::NUDGES.len() {
                 let mut points = self.points(window);
                 for axis in &axes {
-                    points[*axis] = points[*axis].nudged(number);
+                    points[*axis] = points[*axis].perturbed(number);
                 }
                 let mut plant = plant_in(rig, &base.starts[window]);
                 plant
                     .go_on_in(&state_at(&plant, &points, [true; 2]))
                     .expect("a nudge leaves the rig in a state of its own");
-                let (mut nudged, mut jumps) = (Vec::with_capacity(self.rows()), Vec::new());
-                self.read(&mut plant, window, &mut nudged, &mut jumps);
+                let (mut perturbed, mut jumps) = (Vec::with_capacity(self.rows()), Vec::new());
+                self.read(&mut plant, window, &mut perturbed, &mut jumps);
                 out.iter_mut().zip(&jumps).for_each(|(all, jump)| *all |= jump);
                 let change: Vec<f64> =
-                    nudged.iter().zip(baseline).map(|(value, base)| value - base).collect();
+                    perturbed.iter().zip(baseline).map(|(value, base)| value - base).collect();
                 if self.driven.linked {
                     columns.push(change);
                 } else {

@@ -238,7 +238,7 @@ impl Windows<'_> {
 
     /// What one simulation nudges: of which axes, which number of the start state. Axes that do not act on each other are nudged
     /// together.
-    fn nudges(&self) -> Vec<(Vec<usize>, usize)> {
+    fn perturbations(&self) -> Vec<(Vec<usize>, usize)> {
         let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
         let numbers = 0..AxisState::NUDGES.len();
         if self.axes_are_independent() {
@@ -251,19 +251,19 @@ impl Windows<'_> {
     pub(crate) fn sensitivities(&self) -> Vec<Vec<Vec<f64>>> {
         let mut plant = self.plant(&self.rig).with_substeps(COARSE_SUBSTEPS);
         let rows = self.rows();
-        let nudges = self.nudges();
+        let perturbations = self.perturbations();
         let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
         for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
             let judged = self.starts.get(all.len()) == Some(&start);
             let points = self.points[start / WINDOW];
             set_state(&mut plant, self.record, start, &points);
             let mut plants = vec![plant];
-            for (axes, number) in nudges.iter().filter(|_| judged) {
+            for (axes, number) in perturbations.iter().filter(|_| judged) {
                 let mut points = points;
-                axes.iter().for_each(|axis| points[*axis] = points[*axis].nudged(*number));
-                let mut nudged = plants[0].clone();
-                set_state(&mut nudged, self.record, start, &points);
-                plants.push(nudged);
+                axes.iter().for_each(|axis| points[*axis] = points[*axis].perturbed(*number));
+                let mut perturbed = plants[0].clone();
+                set_state(&mut perturbed, self.record, start, &points);
+                plants.push(perturbed);
             }
             let mut read = vec![Vec::with_capacity(rows); plants.len()];
             let mut batch = Batch::new(plants);
@@ -277,7 +277,7 @@ impl Windows<'_> {
             }
             let straight = read.remove(0);
             let mut columns: Vec<((usize, usize), Vec<f64>)> = Vec::new();
-            for ((axes, number), read) in nudges.iter().zip(&read) {
+            for ((axes, number), read) in perturbations.iter().zip(&read) {
                 for axis in axes {
                     let column = self.start_sensitivity(all.len(), *axis, *number, [read, &straight]);
                     columns.push(((*axis, *number), column));
@@ -295,16 +295,20 @@ impl Windows<'_> {
         window: usize,
         axis: usize,
         number: usize,
-        [nudged, straight]: [&Vec<f64>; 2],
+        [perturbed, straight]: [&Vec<f64>; 2],
     ) -> Vec<f64> {
         let valid = &self.valid[window * self.rows()..][..self.rows()];
         let alone = self.axes_are_independent();
         let shows = self.outputs.iter().map(|(of, _)| !alone || *of == axis).cycle();
-        let mut column: Vec<f64> = nudged
+        let mut column: Vec<f64> = perturbed
             .iter()
             .zip(straight)
             .zip(valid.iter().zip(shows))
-            .map(|((nudged, straight), (valid, shows))| if *valid && shows { nudged - straight } else { 0.0 })
+            .map(
+                |((perturbed, straight), (valid, shows))| {
+                    if *valid && shows { perturbed - straight } else { 0.0 }
+                },
+            )
             .collect();
         // Removes jumps that moved by a sample before the difference is scaled up.
         self.flatten(&mut column, JUMP);
