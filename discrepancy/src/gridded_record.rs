@@ -85,16 +85,16 @@ pub struct AxisState {
 
 impl AxisState {
     /// Steps of finite differences in x, v, p_a, p_b: m, m/s, Pa, Pa. Small, so that no stick-slip event moves.
-    pub(crate) const NUDGES: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
+    pub(crate) const PERTURBATIONS: [f64; 4] = [2e-6, 2e-4, 50.0, 50.0];
 
-    /// The state with one of its values nudged, in the order of [`AxisState::NUDGES`].
+    /// The state with one of its values perturbed, in the order of [`AxisState::PERTURBATIONS`].
     pub(crate) fn perturbed(mut self, number: usize) -> Self {
         let value = match number {
             0 => &mut self.extension_m,
             1 => &mut self.rod_velocity_m_per_s,
             _ => &mut self.pressures_pa[number - 2],
         };
-        *value += AxisState::NUDGES[number];
+        *value += AxisState::PERTURBATIONS[number];
         self
     }
 }
@@ -250,8 +250,8 @@ impl GriddedRecord {
         gridded
     }
 
-    /// Standard errors of an axis' smoothed state from the noise of its samples, in the order of [`AxisState::NUDGES`]; 0 of the
-    /// rate of an axis at rest.
+    /// Standard errors of an axis' smoothed state from the noise of its samples, in the order of
+    /// [`AxisState::PERTURBATIONS`]; 0 of the rate of an axis at rest.
     pub(crate) fn state_errors(&self, axis: usize, rests: bool) -> [f64; 4] {
         let error = |channel: usize, variance: f64| {
             let share = self.lag1_autocorrelation[axis][channel];

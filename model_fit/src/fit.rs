@@ -374,7 +374,7 @@ impl<'a> Fitting<'a> {
         }
     }
 
-    /// Normal equations of each block of a cut and output; the last are those of rows that judge nothing.
+    /// Normal equations of each block of a partition and output; the last are those of rows that judge nothing.
     pub(crate) fn normals(&self, values_si: &[f64], cut: &RowBlocks) -> Result<Vec<Vec<Normal>>, Failure> {
         let count = self.model.outputs.len();
         let mut blocks = vec![vec![Normal::zero(self.unknowns.len()); count]; cut.blocks + 1];

@@ -88,7 +88,7 @@ impl WindowUnknown {
 const NO_OFFSET_N: f64 = 1e-3;
 /// Ratio of posterior to prior above which an input is not observable.
 const OBSERVABLE_RATIO: f64 = 0.1;
-/// Largest asymmetry of the response to a nudge and its opposite.
+/// Largest asymmetry of the response to a perturbation and its opposite.
 const KINK: f64 = 0.2;
 /// Windows skipped at the start and after a gap, in which memories fill [rig-model.md: judged after 0.1 s].
 const FILLING: usize = 5;
@@ -189,7 +189,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
 
 struct PerturbedRuns {
     baseline: Readings,
-    /// With a nudge each, in the order of [`NUMBERS`].
+    /// With a perturbation each, in the order of [`NUMBERS`].
     perturbed: Vec<Readings>,
     /// With that of the force the other way.
     opposite: Readings,
@@ -214,7 +214,7 @@ impl PerturbedRuns {
     }
 }
 
-/// The same nudge of both axes.
+/// The same perturbation of both axes.
 fn perturbation(number: WindowUnknown, step: f64) -> Perturbation {
     let mut perturbation = Perturbation::default();
     for axis in 0..2 {
@@ -233,7 +233,7 @@ fn perturbation(number: WindowUnknown, step: f64) -> Perturbation {
     perturbation
 }
 
-/// A window of an axis with its nudged simulations.
+/// A window of an axis with its perturbed simulations.
 struct LinearisedWindow<'a> {
     gridded: &'a GriddedRecord,
     axis: usize,

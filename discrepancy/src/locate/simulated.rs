@@ -51,7 +51,7 @@ impl<'a> RecordFollower<'a> {
         Some(RecordFollower { record, contact_n: contact_forces(rig, record), plant })
     }
 
-    /// Readings of the window at a period with a nudge; `None` for a state that the rig cannot have.
+    /// Readings of the window at a period with a perturbation; `None` for a state that the rig cannot have.
     pub(super) fn run(&self, from: usize, perturbation: &Perturbation) -> Option<Readings> {
         let mut plant = self.plant.clone();
         let points = [0, 1].map(|axis| {

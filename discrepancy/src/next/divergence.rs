@@ -148,7 +148,7 @@ impl<'a> Observer<'a> {
     }
 
     /// Start states of a window, with creep set to rest, as in the workflow: friction then holds the piston in both directions. A
-    /// piston still sliding would respond to one sign of a nudge only.
+    /// piston still sliding would respond to one sign of a perturbation only.
     fn points(&self, window: usize) -> [AxisState; 2] {
         self.driven.points[window * WINDOW].map(|point| {
             let creeps = point.rod_velocity_m_per_s.abs() < REST_M_PER_S;
@@ -203,7 +203,7 @@ impl<'a> Observer<'a> {
         }
     }
 
-    /// Columns of S of a window; marks in `out` the events of the nudged plants.
+    /// Columns of S of a window; marks in `out` the events of the perturbed plants.
     fn sensitivities(
         &self,
         rig: &RigParameters,
@@ -220,7 +220,7 @@ impl<'a> Observer<'a> {
         };
         let mut columns = Vec::new();
         for axes in together {
-            for number in 0..AxisState::NUDGES.len() {
+            for number in 0..AxisState::PERTURBATIONS.len() {
                 let mut points = self.points(window);
                 for axis in &axes {
                     points[*axis] = points[*axis].perturbed(number);

@@ -259,7 +259,7 @@ fn an_interval_of_a_proportion_is_wilsons() {
 
 #[test]
 fn a_piston_at_rest_does_not_tell_the_gains_of_its_chambers_apart() {
-    // Regression: a piston that comes to rest sliding gives way to one sign of a nudge of its pressures alone. Taken as
+    // Regression: a piston that comes to rest sliding gives way to one sign of a perturbation of its pressures alone. Taken as
     // creeping it made a cosine of 0.42 and T = 210 in shut-and-hold; the study ran that, and the records stayed alike. It is
     // 0.98.
     let entry = MENU.iter().find(|entry| entry.name == "shut-and-hold").expect("an entry");

@@ -184,14 +184,14 @@ fn start_states_of_axes_that_do_not_act_on_each_other_are_nudged_together() {
     record.samples.iter_mut().for_each(|samples| samples[1] = samples[0]);
     record.smoothed_states.iter_mut().for_each(|states| states[1] = states[0]);
     let together = Windows::new(&record, &rig).sensitivities();
-    // A regulator that hardly gives way feeds both axes: each is nudged by itself.
+    // A regulator that hardly gives way feeds both axes: each is perturbed by itself.
     let droop = [("droop_bar", 1e-6), ("volume_cm3", 1000.0)];
     let fed = rig.with_effect("supply-droop", "supply", &droop).unwrap();
     let alone = Windows::new(&record, &fed).sensitivities();
     assert_eq!(together.len(), alone.len());
     let norm = |column: &[f64]| column.iter().map(|value| value * value).sum::<f64>().sqrt();
     for (together, alone) in together.iter().zip(&alone) {
-        assert_eq!([together.len(), alone.len()], [2 * AxisState::NUDGES.len(); 2]);
+        assert_eq!([together.len(), alone.len()], [2 * AxisState::PERTURBATIONS.len(); 2]);
         for (one, other) in together.iter().zip(alone) {
             let difference: Vec<f64> = one.iter().zip(other).map(|(one, other)| one - other).collect();
             assert!(norm(&difference) < 0.02 * norm(other), "{} {}", norm(&difference), norm(other));

@@ -22,7 +22,7 @@ const LINKED_PASSES: usize = 3;
 const SHIFTS_M: [[f64; 3]; 2] = [[30e-6, 70e-6, 120e-6], [5e-6, 12e-6, 25e-6]];
 /// Gauss-Newton passes on other records.
 pub(super) const START_PASSES: usize = 2;
-/// Largest change of a force reading by a nudge, in standard deviations; more is a jump.
+/// Largest change of a force reading by a perturbation, in standard deviations; more is a jump.
 const JUMP: f64 = 0.5;
 /// Prior standard deviations of the start state: m, m/s, Pa, Pa.
 const PRIOR_STD: [f64; 4] = [2e-3, 0.2, 2e4, 2e4];
@@ -131,7 +131,7 @@ impl Windows<'_> {
                 let part = |number: usize| {
                     let most = if self.record.linked { MOST_STEP[number] } else { PRIOR_STD[number] };
                     shares[at]
-                        * (moved[place * AxisState::NUDGES.len() + number] * PRIOR_STD[number])
+                        * (moved[place * AxisState::PERTURBATIONS.len() + number] * PRIOR_STD[number])
                             .clamp(-most, most)
                 };
                 let point = &mut self.points[self.starts[at] / WINDOW][*axis];
@@ -236,11 +236,11 @@ impl Windows<'_> {
         Windows { points, readings, ..self.clone() }
     }
 
-    /// What one simulation nudges: of which axes, which number of the start state. Axes that do not act on each other are nudged
+    /// Perturbation of each simulation: its axes, and the index in the start state. Axes that do not act on each other are perturbed
     /// together.
     fn perturbations(&self) -> Vec<(Vec<usize>, usize)> {
         let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
-        let numbers = 0..AxisState::NUDGES.len();
+        let numbers = 0..AxisState::PERTURBATIONS.len();
         if self.axes_are_independent() {
             return numbers.map(|number| (measured.clone(), number)).collect();
         }
@@ -289,7 +289,7 @@ impl Windows<'_> {
         all
     }
 
-    /// Sensitivity of a window to a number of an axis' start state, of its readings with that number nudged and without.
+    /// Sensitivity of a window to a number of an axis' start state, of its readings with that number perturbed and without.
     fn start_sensitivity(
         &self,
         window: usize,
@@ -312,7 +312,7 @@ impl Windows<'_> {
             .collect();
         // Removes jumps that moved by a sample before the difference is scaled up.
         self.flatten(&mut column, JUMP);
-        let scale = PRIOR_STD[number] / AxisState::NUDGES[number];
+        let scale = PRIOR_STD[number] / AxisState::PERTURBATIONS[number];
         column.iter_mut().for_each(|value| *value *= scale);
         self.whiten(window, &mut column);
         column
