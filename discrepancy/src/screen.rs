@@ -105,9 +105,9 @@ impl Columns {
         all.map(Vec::as_slice).collect()
     }
 
-    /// Largest gain of `count` candidates that join one after the other, those before the last by their loss; `products` are of
-    /// [`Columns::with_model`] without a model. `gain` is that of windows from the squares without to those with them; each column is
-    /// charged [`COLUMN_PENALTY`].
+    /// Largest gain of `count` candidates that join one after the other, those before the last by their loss; `products` are
+    /// of [`Columns::with_model`] without a model. `gain` is that of windows from the squares without to those with them; each
+    /// column is charged [`COLUMN_PENALTY`].
     pub(crate) fn largest_gain(
         &self,
         products: &Products,

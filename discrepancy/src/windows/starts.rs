@@ -236,8 +236,8 @@ impl Windows<'_> {
         Windows { points, readings, ..self.clone() }
     }
 
-    /// Perturbation of each simulation: its axes, and the index in the start state. Axes that do not act on each other are perturbed
-    /// together.
+    /// Perturbation of each simulation: its axes, and the index in the start state. Axes that do not act on each other
+    /// are perturbed together.
     fn perturbations(&self) -> Vec<(Vec<usize>, usize)> {
         let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
         let numbers = 0..AxisState::PERTURBATIONS.len();
