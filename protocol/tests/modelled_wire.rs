@@ -15,7 +15,6 @@ use rand_pcg::Pcg64Mcg;
 const BITS_PER_S: u32 = 1_000_000;
 const MS: u64 = 1_000_000;
 
-/// A frame with any content.
 fn any_frame(message: &MessageSpec, random: &mut Pcg64Mcg) -> CanFrame {
     CanFrame::new(message.id, &random.next_u64().to_le_bytes()[..usize::from(message.length)])
 }

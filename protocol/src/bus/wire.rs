@@ -69,7 +69,6 @@ impl WireOrders {
     }
 }
 
-/// Outcome of a frame on the wire.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum FrameOutcome {
     /// It is delivered to all peers but its sender and the deaf ones.
@@ -169,7 +168,6 @@ impl Wire {
         });
     }
 
-    /// Releases the held frames that are due by `now_ns`.
     pub(super) fn release_due(&mut self, now_ns: u64, outcomes: &mut Vec<FrameOutcome>) {
         self.release(outcomes, |held| held.due_ns.is_some_and(|due_ns| due_ns <= now_ns));
     }
@@ -192,7 +190,6 @@ impl Wire {
         }
     }
 
-    /// Frames of babbling nodes up to `now_ns`.
     pub(super) fn babble(&mut self, now_ns: u64, babbled: &mut Vec<CanFrame>) {
         for active in &mut self.active {
             let WireFault::Babbling { id, frames_per_ms, bytes } = active.fault else { continue };

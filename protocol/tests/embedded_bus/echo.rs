@@ -26,11 +26,6 @@ fn command(cycle: u64) -> CanFrame {
     Frame::DriveValveCommand(command).encode().unwrap()
 }
 
-/// Waits for the rig's turn, and counts the commands that came before it.
-fn commands_until_go(rig: &mut dyn Bus, cycle: u32) -> u32 {
-    go(rig, cycle).len() as u32
-}
-
 /// A stranger that never saw the sensors of a cycle once held the barrier until its time-out.
 #[test]
 fn lost_frames_do_not_hold_the_barrier_of_a_stranger() {
@@ -54,11 +49,12 @@ fn lost_frames_do_not_hold_the_barrier_of_a_stranger() {
                 answers += 1;
             }
         });
-        let mut commands = commands_until_go(rig.as_mut(), 0);
+        // What comes before the rig's turn are commands.
+        let mut commands = go(rig.as_mut(), 0).len();
         for cycle in 0..CYCLES {
             rig.send(&sensors(cycle)).unwrap();
             rig.done(cycle);
-            commands += commands_until_go(rig.as_mut(), cycle + 1);
+            commands += go(rig.as_mut(), cycle + 1).len();
         }
         // Of so many fences one gets through; without sensors nobody is done with this cycle, and nobody has to be.
         for _ in 0..20 {
@@ -68,7 +64,7 @@ fn lost_frames_do_not_hold_the_barrier_of_a_stranger() {
         let answers = answers.join().unwrap();
         let lost = host.stop().injected_loss.by_name();
         assert_eq!(answers + lost["120"], u64::from(CYCLES));
-        assert_eq!(u64::from(commands) + lost["110"], answers);
+        assert_eq!(commands as u64 + lost["110"], answers);
         answers
     });
     // Binomial: 475 expected, standard deviation 5; five of them.
@@ -80,12 +76,12 @@ const MORE_THAN_A_QUEUE: usize = 14_000;
 
 /// Runs a foreign controller into a full queue: it answers cycle 0 and does not read in cycle 1, whose sensors it loses.
 fn fill_the_queue_of(stranger: &mut dyn Bus, rig: &mut dyn Bus) {
-    commands_until_go(rig, 0);
+    go(rig, 0);
     rig.send(&sensors(0)).unwrap();
     rig.done(0);
     assert_eq!(next_frame(stranger).0, sensors(0));
     stranger.send(&command(0)).unwrap();
-    commands_until_go(rig, 1);
+    go(rig, 1);
     for number in 0..MORE_THAN_A_QUEUE {
         rig.send(&numbered(0x100, number)).unwrap();
     }
@@ -105,11 +101,11 @@ fn the_full_queue_of_a_stranger_does_not_hold_the_barrier() {
     let mut rig = joined(&place.socket(), Role::Rig, "rig");
     let mut stranger = open(&place.socket());
     fill_the_queue_of(stranger.as_mut(), rig.as_mut());
-    commands_until_go(rig.as_mut(), 2);
+    go(rig.as_mut(), 2);
     for cycle in 2..50 {
         rig.send(&sensors(cycle)).unwrap();
         rig.done(cycle);
-        commands_until_go(rig.as_mut(), cycle + 1);
+        go(rig.as_mut(), cycle + 1);
     }
     let dropped = host.stop().peers[1].dropped_at_queue.by_name();
     assert_eq!(dropped["120"], 49, "{dropped:?}");
@@ -139,7 +135,7 @@ fn a_stranger_that_lost_its_sensors_is_waited_for_until_it_has_read_the_rest() {
                 }
             }
         });
-        commands_until_go(rig.as_mut(), 2);
+        go(rig.as_mut(), 2);
         assert!(has_read.load(Ordering::SeqCst), "the barrier went on without it");
         rig.send(&CanFrame::new(FENCE_ID, &[])).unwrap();
         rig.done(2);

@@ -7,7 +7,6 @@ use protocol::bus::{Received, WireOptions};
 use protocol::can::CanFrame;
 use std::collections::BTreeMap;
 
-/// Frames by the name of their identifier.
 type FramesByName = BTreeMap<String, u64>;
 
 const IDS: [u16; 3] = [0x110, 0x120, 0x121];

@@ -14,7 +14,7 @@ fn mode(path: &std::path::Path) -> u32 {
 #[test]
 fn the_socket_is_for_its_user_alone_and_goes_with_its_host() {
     let place = Place::new();
-    let folder = place.folder().join("a/b");
+    let folder = place.folder.path().join("a/b");
     let path = folder.join("bus0");
     let host = RunningHost::plain(&path);
     assert!(fs::symlink_metadata(&path).unwrap().file_type().is_socket());
@@ -45,13 +45,13 @@ fn a_live_host_is_neither_replaced_nor_disturbed() {
     else {
         panic!("a second host was let in");
     };
-    assert_eq!(lock, place.folder().join("bus0.lock").display().to_string());
+    assert_eq!(lock, place.folder.path().join("bus0.lock").display().to_string());
     one.send(&numbered(1, 1)).unwrap();
     assert_eq!(next_frame(two.as_mut()).0, numbered(1, 1));
     assert_eq!((one.counters().disconnects, two.counters().disconnects), (0, 0));
     host.stop();
     // The lock went with its holder, though its file is still there.
-    assert!(place.folder().join("bus0.lock").exists());
+    assert!(place.folder.path().join("bus0.lock").exists());
     RunningHost::plain(&place.socket()).stop();
 }
 
@@ -72,7 +72,7 @@ fn a_file_that_is_no_socket_is_refused_and_kept() {
 #[test]
 fn buses_whose_names_differ_after_a_dot_do_not_share_a_lock() {
     let place = Place::new();
-    let hosts = ["rig.one", "rig.two", "rig"].map(|name| RunningHost::plain(&place.folder().join(name)));
+    let hosts = ["rig.one", "rig.two", "rig"].map(|name| RunningHost::plain(&place.folder.path().join(name)));
     for host in hosts {
         host.stop();
     }

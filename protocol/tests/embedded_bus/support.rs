@@ -24,16 +24,12 @@ pub(crate) const FENCE_ID: u16 = 0x7FE;
 
 /// A folder with a socket path in it; the folder goes with the value.
 pub(crate) struct Place {
-    folder: tempfile::TempDir,
+    pub(crate) folder: tempfile::TempDir,
 }
 
 impl Place {
     pub(crate) fn new() -> Self {
         Self { folder: tempfile::tempdir().expect("a temporary folder can be made") }
-    }
-
-    pub(crate) fn folder(&self) -> &Path {
-        self.folder.path()
     }
 
     pub(crate) fn socket(&self) -> PathBuf {
@@ -62,7 +58,6 @@ impl RunningHost {
         Self::start(path, WireOptions::default(), None)
     }
 
-    /// Stops the host and tells what it counted.
     pub(crate) fn stop(self) -> HostReport {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.join().expect("the host does not panic").expect("the host serves until it is stopped")
@@ -227,7 +222,6 @@ pub(crate) fn frames_until(peer: &mut dyn Bus, last: impl Fn(&CanFrame) -> bool)
     }
 }
 
-/// Frames up to the next fence.
 pub(crate) fn frames_until_fence(peer: &mut dyn Bus) -> Vec<CanFrame> {
     frames_until(peer, |frame| frame.standard_id() == Some(FENCE_ID))
 }

@@ -16,7 +16,6 @@ pub(super) struct Peer {
     stopped_reading: bool,
 }
 
-/// Outcome of sending a packet to a peer.
 pub(super) enum SendOutcome {
     /// Its queue took it.
     Delivered,
