@@ -10,9 +10,9 @@
 //! [`leading`] wires the first two. Both axes run the same main chain and know each other through [`Partner`] alone: an OK flag,
 //! the states of the chains and a few values. What the partner sends in a cycle is seen in the next one.
 //!
-//! Every chain has the same form: `advance` notes what it is given, asks the pure `decide` for at most one edge, and goes it
-//! through `enter`, the only writer of its state, which notes the cause. So every state lasts for at least one cycle and shows
-//! in the record. Nothing here allocates, sleeps, reads or prints.
+//! Every chain has the same form: `advance` notes what it is given, without a change of state, asks the pure `decide` for at most
+//! one edge, and goes it through `enter`, the only writer of its state, which notes the cause. So every state lasts for at least
+//! one cycle and shows in the record. Nothing here allocates, sleeps, reads or prints.
 //!
 //! Time is the rig's: cycles of 1 ms by number. Cycles may be skipped, so all times are differences of numbers, never counts of
 //! calls.

@@ -18,6 +18,7 @@ use protocol::frames::{DecodeError, EmergencyStop, Frame, MainChainState, Sensor
 use protocol::{bus::FrameSink, can::CanFrame, periods::TICK_CYCLES};
 use runlog::controller_report::IgnoredFrames;
 use std::collections::VecDeque;
+use std::fmt::Display;
 
 /// Ticks of the rig without sensors of an axis after which these count as lost: 50 ms, before its partner gives it up.
 const SILENT_TICKS: u64 = 5;
@@ -32,7 +33,7 @@ pub enum NodeEvent {
     /// The main chain of an axis went to this state in this cycle, because of this.
     State {
         axis: Axis,
-        #[serde(serialize_with = "state_name")]
+        #[serde(serialize_with = "in_words")]
         state: MainChainState,
         cycle: u64,
         #[serde(serialize_with = "in_words")]
@@ -44,12 +45,8 @@ pub enum NodeEvent {
     SensorsSilent,
 }
 
-fn state_name<S: serde::Serializer>(state: &MainChainState, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_str(state.name())
-}
-
-fn in_words<S: serde::Serializer>(cause: &MainCause, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(cause)
+fn in_words<S: serde::Serializer>(shown: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(shown)
 }
 
 /// A parameter that shall change, already checked against its table.

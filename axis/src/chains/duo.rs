@@ -55,10 +55,6 @@ impl SimulatedAxis {
         self.supervisory.main.entered.state
     }
 
-    pub(super) fn fault(&self) -> Option<Fault> {
-        self.output.and_then(|output| output.fault)
-    }
-
     pub(super) fn stop_state(&self) -> EmergencyStopChainState {
         self.supervisory.stop.state()
     }
@@ -137,16 +133,12 @@ impl AxisPair {
         }
     }
 
-    fn rig_is_stopped(&self) -> bool {
-        self.console_holds || self.axes.iter().any(|axis| axis.holds)
-    }
-
     /// One cycle of both; each sees what the other sent in the cycle before.
     pub(super) fn step(&mut self) {
         if self.console.release {
             self.console_holds = false;
         }
-        let emergency_stop = self.rig_is_stopped();
+        let emergency_stop = self.console_holds || self.axes.iter().any(|axis| axis.holds);
         let supply_pressure_pa = if emergency_stop { 1e5 } else { SUPPLY_PA };
         let rig = RigStatus {
             emergency_stop,
@@ -190,7 +182,7 @@ impl AxisPair {
     }
 
     pub(super) fn faults(&self) -> [Option<Fault>; 2] {
-        [0, 1].map(|index| self.axes[index].fault())
+        [0, 1].map(|index| self.axes[index].output.and_then(|output| output.fault))
     }
 
     /// The console trips the emergency stop for half a second.
@@ -200,6 +192,13 @@ impl AxisPair {
         self.console.release = true;
         self.step();
     }
+}
+
+/// A pair whose second axis has no controller, and whose first needs none.
+pub(super) fn alone(config: MainConfig) -> AxisPair {
+    let mut pair = AxisPair::new(&MainConfig { partner_needed: false, ..config });
+    pair.axes[1].alive = false;
+    pair
 }
 
 /// Half a second of positioning, 0.2 s of force, 0.3 s of settling, 1 s of experiment.

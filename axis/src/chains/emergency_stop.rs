@@ -179,7 +179,6 @@ impl EmergencyStopChain {
         }
     }
 
-    /// Keeps what the inputs tell, without a change of state.
     fn note(&mut self, inputs: &StopInputs) {
         let up = self.is_up(inputs);
         match &mut self.state {
@@ -242,7 +241,6 @@ impl EmergencyStopChain {
         }
     }
 
-    /// The only writer of the state.
     fn enter(&mut self, state: EmergencyStopChainState, cause: StopCause, now: u64) {
         use EmergencyStopChainState as S;
         self.state = match state {

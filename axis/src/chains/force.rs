@@ -170,7 +170,6 @@ impl ForceChain {
         self.entered.cycle = cycle;
     }
 
-    /// Keeps what the inputs tell, without a change of state.
     fn note(&mut self, inputs: &ForceInputs, numbers: &Parameters) {
         let ForceInputs { cycle, force_n, velocity_m_per_s, .. } = *inputs;
         let now = Mean { cycle, force_n, velocity_m_per_s };
@@ -269,7 +268,6 @@ impl ForceChain {
         }
     }
 
-    /// The only writer of the state.
     fn enter(&mut self, state: ForceChainState, cause: ForceCause, now: u64) {
         use ForceChainState as S;
         self.state = match state {

@@ -85,21 +85,15 @@ impl SupervisoryChains {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chains::duo::{AxisPair, short};
+    use crate::chains::duo::{alone, short};
     use crate::chains::settled::ControlError;
     use protocol::frames::{EmergencyStopChainState as E, MainChainState as S};
 
     const FAR: ControlError = ControlError::Position { error_m: 0.1 };
 
-    fn alone() -> AxisPair {
-        let mut pair = AxisPair::new(&MainConfig { partner_needed: false, ..short() });
-        pair.axes[1].alive = false;
-        pair
-    }
-
     #[test]
     fn an_own_fault_is_released_by_a_person_and_the_run_begins_anew_to_its_end() {
-        let mut pair = alone();
+        let mut pair = alone(short());
         pair.axes[0].error = FAR;
         pair.run_to(S::Fault);
         assert_eq!(pair.faults()[0], Some(Fault::SettlingTimeout));
@@ -118,7 +112,7 @@ mod tests {
 
     #[test]
     fn the_same_fault_trips_again_when_it_comes_again_while_the_rig_recovers() {
-        let mut pair = alone();
+        let mut pair = alone(short());
         pair.axes[0].error = FAR;
         pair.run_to(S::Fault);
         pair.run(1500);

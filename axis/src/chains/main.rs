@@ -128,7 +128,6 @@ impl MainChain {
         self.settling.still
     }
 
-    /// Stores what later cycles need of the inputs, without a change of state.
     fn note(&mut self, inputs: &MainInputs) {
         let cycle = inputs.cycle;
         if let Some(measurement) = inputs.measurement {
@@ -152,7 +151,6 @@ impl MainChain {
         }
     }
 
-    /// The only writer of the state.
     fn enter(&mut self, state: MainChainState, cause: MainCause, inputs: &MainInputs) {
         use MainChainState as S;
         let stopped = inputs.emergency_stop != EmergencyStopChainState::Ready;

@@ -146,7 +146,6 @@ impl MatchingChain {
         self.entered.cycle = cycle;
     }
 
-    /// Keeps what the inputs tell, without a change of state.
     fn note(&mut self, inputs: &MatchingInputs, numbers: &Parameters) {
         let cycle = inputs.cycle;
         let partner_m = partner_position_m(inputs);
@@ -224,7 +223,6 @@ impl MatchingChain {
         MatchingOutput { state: self.entered.state, offset_m: self.offset_m, matched, fault }
     }
 
-    /// The only writer of the state.
     fn enter(&mut self, state: MatchingChainState, cause: MatchingCause, now: u64) {
         use MatchingChainState as S;
         let [positions, partner] = [Positions::NONE; 2];

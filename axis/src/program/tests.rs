@@ -22,10 +22,6 @@ fn program(text: &str) -> Program {
     source.program(Axis::Drive, &RigParameters::baseline(), false).unwrap()
 }
 
-fn value(program: &Program, name: &str) -> f64 {
-    program.values()[program.place(name).unwrap()]
-}
-
 fn demand() -> Demand {
     Demand { position: SetPoint::at_rest(0.2), force: ForceSetPoint::at_rest(0.0) }
 }
@@ -66,7 +62,7 @@ fn what_the_chain_decides_stays_out_of_the_users_variables() {
     let _ = giving_way(&mut program, 0, Some(0.02));
     let _ = giving_way(&mut program, 1, None);
     assert_eq!(program.values(), before);
-    assert_eq!(value(&program, "giving-way.limit_m_per_s"), 0.3);
+    assert_eq!(program.values()[program.place("giving-way.limit_m_per_s").unwrap()], 0.3);
     // Moving, there would be no dead zone: -100 N * 0.001 m/(N s) instead of 95 N of it.
     for (name, number) in [("gain_m_per_n_s", 0.001), ("dead_zone_n", 5.0)] {
         let place = program.place(&format!("giving-way.{name}")).unwrap();

@@ -15,6 +15,13 @@ fn take_both(view: &mut RigView, cycle: u64) {
     Axis::ALL.iter().for_each(|axis| view.take_sensors(*axis, sensors(cycle)));
 }
 
+/// The view of a rig whose frames of `cycles` came, without those that `lost` names.
+fn played(cycles: std::ops::Range<u64>, lost: &[u64]) -> RigView {
+    let mut view = RigView::default();
+    play(&mut view, cycles, lost);
+    view
+}
+
 /// Plays the rig's frames of `cycles`, without those that `lost` names.
 fn play(view: &mut RigView, cycles: std::ops::Range<u64>, lost: &[u64]) {
     play_after(0, view, cycles, lost);
@@ -41,8 +48,7 @@ fn sensors_without_a_tick_have_no_cycle() {
 
 #[test]
 fn each_frame_has_its_cycle_and_is_fresh_once() {
-    let mut view = RigView::default();
-    play(&mut view, 5000..5011, &[]);
+    let mut view = played(5000..5011, &[]);
     assert_eq!(view.fresh_sensors(Axis::Drive).unwrap().0, 5010);
     assert!(view.fresh_sensors(Axis::Drive).is_none());
     view.take_sensors(Axis::Drive, sensors(5013));
@@ -52,15 +58,13 @@ fn each_frame_has_its_cycle_and_is_fresh_once() {
 
 #[test]
 fn lost_frames_are_counted_exactly() {
-    let mut view = RigView::default();
-    play(&mut view, 0..1001, &[3, 15, 16, 17, 500]);
+    let view = played(0..1001, &[3, 15, 16, 17, 500]);
     assert_eq!(view.lost, PerAxis { drive: 5, load: 5 });
 }
 
 #[test]
 fn a_late_frame_is_counted_and_answered_by_nobody() {
-    let mut view = RigView::default();
-    play(&mut view, 0..98, &[95]);
+    let mut view = played(0..98, &[95]);
     let _ = view.fresh_sensors(Axis::Drive);
     view.take_sensors(Axis::Drive, sensors(95));
     assert!(view.fresh_sensors(Axis::Drive).is_none());
@@ -71,8 +75,7 @@ fn a_late_frame_is_counted_and_answered_by_nobody() {
 
 #[test]
 fn a_frame_later_than_the_tick_that_missed_it_is_not_lost_in_the_end() {
-    let mut view = RigView::default();
-    play(&mut view, 0..101, &[99]);
+    let mut view = played(0..101, &[99]);
     assert_eq!(view.lost.drive, 1);
     view.take_sensors(Axis::Drive, sensors(99));
     play(&mut view, 101..151, &[]);
@@ -81,8 +84,7 @@ fn a_frame_later_than_the_tick_that_missed_it_is_not_lost_in_the_end() {
 
 #[test]
 fn a_duplicate_is_counted_and_hides_no_loss() {
-    let mut view = RigView::default();
-    play(&mut view, 0..98, &[93]);
+    let mut view = played(0..98, &[93]);
     let _ = view.fresh_sensors(Axis::Load);
     for again in [97, 96, 97] {
         view.take_sensors(Axis::Load, sensors(again));
@@ -96,8 +98,7 @@ fn a_duplicate_is_counted_and_hides_no_loss() {
 #[test]
 fn a_gap_after_which_the_counter_is_behind_is_no_late_frame() {
     for gap in 13..=17 {
-        let mut view = RigView::default();
-        play(&mut view, 0..100, &[]);
+        let mut view = played(0..100, &[]);
         view.take_sensors(Axis::Drive, sensors(99 + gap));
         assert_eq!((view.late, view.duplicate), (PerAxis::default(), PerAxis::default()), "{gap}");
         assert!(view.fresh_sensors(Axis::Drive).is_some());
@@ -114,8 +115,7 @@ fn more_lost_frames_than_the_counter_can_tell_are_found_by_the_tick() {
 
 #[test]
 fn skipped_cycles_are_not_lost() {
-    let mut view = RigView::default();
-    play(&mut view, 0..101, &[]);
+    let mut view = played(0..101, &[]);
     view.take_tick(&Tick { catch_up: true, ..tick(151, 50) });
     play_after(50, &mut view, 151..201, &[]);
     assert_eq!((view.lost.drive, view.skipped), (0, 50));
@@ -125,8 +125,7 @@ fn skipped_cycles_are_not_lost() {
 
 #[test]
 fn a_stall_of_more_cycles_than_the_tick_can_count_loses_nothing() {
-    let mut view = RigView::default();
-    play(&mut view, 0..101, &[]);
+    let mut view = played(0..101, &[]);
     let skipped = (100_000 % SKIPPED_RANGE) as u16;
     view.take_tick(&Tick { catch_up: true, ..tick(100_101, skipped) });
     play_after(skipped, &mut view, 100_101..100_201, &[]);
@@ -145,8 +144,7 @@ fn the_cycle_goes_on_when_the_ticks_counter_wraps() {
 
 #[test]
 fn an_emergency_stop_of_the_old_rig_is_not_the_new_ones() {
-    let mut view = RigView::default();
-    play(&mut view, 0..5001, &[]);
+    let mut view = played(0..5001, &[]);
     view.take_status(RigStatus { emergency_stop: true, ..RigStatus::default() });
     view.take_tick(&tick(0, 0));
     assert!(view.status().is_none());
@@ -169,16 +167,14 @@ fn a_status_holds_for_a_hundred_cycles() {
 
 #[test]
 fn the_ending_tick_settles_the_last_frames() {
-    let mut view = RigView::default();
-    play(&mut view, 0..98, &[95]);
+    let mut view = played(0..98, &[95]);
     let news = view.take_tick(&Tick { ending: true, ..tick(98, 0) });
     assert_eq!((news, view.lost.drive), (TickEvent::Ending, 1));
 }
 
 #[test]
 fn a_rig_that_starts_anew_is_noticed_and_loses_nothing() {
-    let mut view = RigView::default();
-    play(&mut view, 0..5001, &[]);
+    let mut view = played(0..5001, &[]);
     view.take_sensors(Axis::Drive, sensors(0));
     assert_eq!(view.take_tick(&tick(0, 0)), TickEvent::Restarted);
     play(&mut view, 1..101, &[]);
@@ -190,8 +186,7 @@ fn a_rig_that_starts_anew_is_noticed_and_loses_nothing() {
 /// twice, they looked like a rig that had started anew.
 #[test]
 fn sensors_that_pass_others_at_arbitration_are_no_round_of_the_counter() {
-    let mut view = RigView::default();
-    play(&mut view, 0..100, &[]);
+    let mut view = played(0..100, &[]);
     for cycle in 100..110 {
         view.take_sensors(Axis::Drive, sensors(cycle + 1));
         view.take_sensors(Axis::Load, sensors(cycle));
@@ -205,8 +200,7 @@ fn sensors_that_pass_others_at_arbitration_are_no_round_of_the_counter() {
 /// After a stall the tick is sent first, and arbitration puts the sensors, whose identifiers are lower, ahead of it.
 #[test]
 fn sensors_that_pass_their_tick_are_not_lost() {
-    let mut view = RigView::default();
-    play(&mut view, 0..100, &[]);
+    let mut view = played(0..100, &[]);
     let before = view.lost;
     // Cycles 100 to 104 are skipped.
     take_both(&mut view, 105);

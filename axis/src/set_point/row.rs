@@ -6,7 +6,6 @@ use std::sync::Arc;
 /// Sums of decimal fractions carry roundings: a segment begins a nanosecond early, so that it never misses its cycle of 1 ms.
 pub(super) const ROUNDING_S: f64 = 1e-9;
 
-/// A segment of a row.
 pub(super) trait RowSegment {
     /// Its duration, s, and the value from its end on.
     fn duration_and_end(&self) -> (f64, f64);

@@ -75,20 +75,16 @@ impl ChainBench {
         assert_eq!(bench.chain.state(), state);
         bench
     }
-
-    fn cause(&self) -> StopCause {
-        self.chain.entered.cause
-    }
 }
 
 #[test]
 fn the_rigs_stop_goes_round_to_ready() {
     for after in [AfterStop::End, AfterStop::Restart] {
         let mut bench = ChainBench::to(after, S::Recovering);
-        assert_eq!(bench.cause(), StopCause::Released);
+        assert_eq!(bench.chain.entered.cause, StopCause::Released);
         assert_eq!(bench.run(200), S::Recovering);
         assert_eq!(bench.step(), S::Ready);
-        assert_eq!(bench.cause(), StopCause::Recovered);
+        assert_eq!(bench.chain.entered.cause, StopCause::Recovered);
     }
 }
 
@@ -97,7 +93,7 @@ fn on_start_waits_for_a_person() {
     let mut bench = ChainBench::to(AfterStop::OnStart, S::WaitingForStart);
     assert_eq!(bench.run(100_000), S::WaitingForStart);
     bench.inputs.console.start = true;
-    assert_eq!((bench.step(), bench.cause()), (S::Ready, StopCause::Started));
+    assert_eq!((bench.step(), bench.chain.entered.cause), (S::Ready, StopCause::Started));
 }
 
 #[test]
@@ -115,18 +111,18 @@ fn everything_trips_from_everywhere_in_its_cycle() {
     for state in [S::Ready, S::Recovering, S::WaitingForStart] {
         let mut bench = ChainBench::to(AfterStop::OnStart, state);
         bench.inputs.rig = Some(rig(true));
-        assert_eq!((bench.step(), bench.cause()), (S::Tripped, StopCause::Rig), "{state}");
+        assert_eq!((bench.step(), bench.chain.entered.cause), (S::Tripped, StopCause::Rig), "{state}");
 
         let mut bench = ChainBench::to(AfterStop::OnStart, state);
         bench.inputs.frame = Some(EmergencyStopReason::Operator);
         let cause = StopCause::Frame(EmergencyStopReason::Operator);
-        assert_eq!((bench.step(), bench.cause()), (S::Tripped, cause), "{state}");
+        assert_eq!((bench.step(), bench.chain.entered.cause), (S::Tripped, cause), "{state}");
     }
     for state in [S::Ready, S::Tripped, S::WaitingForRelease, S::Recovering, S::WaitingForStart] {
         let mut bench = ChainBench::to(AfterStop::OnStart, state);
         bench.chain.trip(Fault::SensorLoss, bench.inputs.cycle);
         assert_eq!(
-            (bench.chain.state(), bench.cause()),
+            (bench.chain.state(), bench.chain.entered.cause),
             (S::Tripped, StopCause::LocalFault(Fault::SensorLoss))
         );
         let stop = EmergencyStop { reason: EmergencyStopReason::SensorLoss, release: false };
@@ -142,7 +138,7 @@ fn tripped_lasts_until_standstill_and_a_second_at_most() {
         let mut bench = ChainBench::to(AfterStop::Restart, S::Tripped);
         bench.inputs.at_standstill = at_standstill;
         assert_eq!(bench.run(cycles - 1), S::Tripped);
-        assert_eq!((bench.step(), bench.cause()), (S::WaitingForRelease, cause));
+        assert_eq!((bench.step(), bench.chain.entered.cause), (S::WaitingForRelease, cause));
     }
 }
 
@@ -279,7 +275,7 @@ fn a_new_rig_makes_ready_from_everywhere() {
     for state in [S::Ready, S::Tripped, S::WaitingForRelease, S::Recovering, S::WaitingForStart] {
         let mut bench = ChainBench::to(AfterStop::OnStart, state);
         bench.chain.restart(0);
-        assert_eq!((bench.chain.state(), bench.cause()), (S::Ready, StopCause::RigRestarted));
+        assert_eq!((bench.chain.state(), bench.chain.entered.cause), (S::Ready, StopCause::RigRestarted));
     }
     let mut bench = holding(Fault::PartnerLost);
     bench.chain.restart(0);

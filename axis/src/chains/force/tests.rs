@@ -5,16 +5,6 @@ use crate::chains::until_another;
 use ForceChainState as S;
 use proptest::prelude::*;
 
-fn defaults() -> Vec<f64> {
-    Parameters::TABLE.iter().map(|parameter| parameter.default).collect()
-}
-
-/// The default of a time, in cycles.
-fn cycles_of(name: &str) -> u64 {
-    let parameter = Parameters::TABLE.iter().find(|parameter| parameter.name == name).unwrap();
-    cycles(parameter.default)
-}
-
 struct ChainBench {
     chain: ForceChain,
     inputs: ForceInputs,
@@ -24,7 +14,8 @@ struct ChainBench {
 impl ChainBench {
     fn new(request: ForceRequest) -> Self {
         let inputs = ForceInputs { request, ..ForceInputs::default() };
-        Self { chain: ForceChain::default(), inputs, values: defaults() }
+        let values = Parameters::TABLE.iter().map(|parameter| parameter.default).collect();
+        Self { chain: ForceChain::default(), inputs, values }
     }
 
     fn step(&mut self) -> ForceOutput {
@@ -163,7 +154,7 @@ fn a_relief_that_takes_too_long_is_a_fault_from_each_state() {
         assert_eq!(before, last);
         assert_eq!(bench.step().fault, Some(Fault::RelieveTimeout));
         let cycles = bench.chain.entered.cycle;
-        let timeout = cycles_of("relieve_timeout_s");
+        let timeout = super::cycles(Parameters::default().relieve_timeout_s);
         assert!((timeout..=timeout + 3).contains(&cycles), "{last}: {cycles}");
         bench.inputs.request = ForceRequest::Manual;
         assert_eq!(bench.step().state, S::Fault);

@@ -4,7 +4,7 @@ mod edges;
 mod partner;
 
 use super::*;
-use crate::chains::duo::{AxisPair, SimulatedAxis, short};
+use crate::chains::duo::{AxisPair, SimulatedAxis, alone, short};
 use crate::chains::settled::ControlError;
 use crate::chains::{AfterStop, Console, Partner};
 use MainChainState as S;
@@ -12,12 +12,6 @@ use protocol::frames::ChainStatus;
 
 const RUNNING: [S; 6] =
     [S::InitialPositioning, S::Preparing, S::InitialForce, S::Settling, S::Experiment, S::FinalSettling];
-
-fn alone(config: MainConfig) -> AxisPair {
-    let mut pair = AxisPair::new(&MainConfig { partner_needed: false, ..config });
-    pair.axes[1].alive = false;
-    pair
-}
 
 fn order(axis: &SimulatedAxis) -> Vec<S> {
     axis.state_log.iter().map(|(_, state)| *state).collect()

@@ -52,10 +52,6 @@ impl ChainBench {
         }
         bench
     }
-
-    fn cause(&self) -> MatchingCause {
-        self.chain.entered.cause
-    }
 }
 
 #[test]
@@ -118,7 +114,7 @@ fn what_moves_while_averaging_breaks_it_off() {
         }
         disturb(&mut bench);
         let (cycles, state) = bench.next();
-        assert_eq!((state, bench.cause()), (S::WaitingForRest, cause));
+        assert_eq!((state, bench.chain.entered.cause), (S::WaitingForRest, cause));
         assert!(cycles <= within, "{cause:?}: {cycles}");
     }
 }
@@ -176,7 +172,7 @@ fn what_is_no_longer_asked_is_given_up() {
     for state in [S::WaitingForRest, S::Averaging] {
         let mut bench = ChainBench::to(state);
         bench.inputs.requested = false;
-        assert_eq!((bench.step().state, bench.cause()), (S::Idle, MatchingCause::NotRequested));
+        assert_eq!((bench.step().state, bench.chain.entered.cause), (S::Idle, MatchingCause::NotRequested));
     }
     let mut bench = ChainBench::new();
     bench.inputs.linked = false;
