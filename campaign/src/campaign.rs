@@ -4,8 +4,7 @@ use crate::child::TimeLimit;
 use crate::command::{self, CommandError, Invocation};
 use crate::condition::{self, Condition, ConditionError};
 use crate::factor::Value;
-use crate::file;
-use crate::file::{CampaignFile, ExperimentKind, Kind, Pace, RESERVED};
+use crate::file::{self, CampaignFile, ExperimentKind, Kind, Pace, RESERVED};
 use crate::inputs::{CampaignInputs, InputsError};
 use crate::outcome::{EndState, Outcome};
 use crate::parts::{Parts, default_runs_per_part, hash};
@@ -40,7 +39,6 @@ pub(crate) struct InstallPaths {
     pub programs: PathBuf,
 }
 
-/// Why a campaign cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum CampaignError {
     #[error(transparent)]

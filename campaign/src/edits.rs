@@ -89,10 +89,7 @@ fn document(text: &str) -> Result<DocumentMut, EditError> {
 
 /// Puts the number at `rest` below `item`; `path` is the whole, for messages.
 fn put(item: &mut Item, path: &str, rest: &str, number: f64) -> Result<(), EditError> {
-    let (part, further) = match rest.split_once('.') {
-        Some((part, further)) => (part, Some(further)),
-        None => (rest, None),
-    };
+    let (part, further) = rest.split_once('.').map_or((rest, None), |(part, further)| (part, Some(further)));
     let wrong = |what| EditError::Path { path: path.to_owned(), part: part.to_owned(), what };
     match item {
         Item::Table(table) => match further {

@@ -86,10 +86,7 @@ impl Start<'_> {
         });
         match failed.into_inner().expect("no holder panics") {
             Some(error) => Err(error),
-            None => {
-                let missing = self.missing(&of_shard)?.len() as u64;
-                Ok(StartReport { missing, ..progress.done() })
-            }
+            None => Ok(progress.report(self.missing(&of_shard)?.len() as u64)),
         }
     }
 
@@ -165,8 +162,7 @@ impl Start<'_> {
             rows += &self.campaign.row(&point, &outcome);
             progress.ran(outcome.simulated_s);
         }
-        self.campaign.parts.write(self.out, part, &rows)?;
-        Ok(())
+        Ok(self.campaign.parts.write(self.out, part, &rows)?)
     }
 }
 
@@ -205,12 +201,12 @@ impl<'a> Progress<'a> {
         }
     }
 
-    fn done(&self) -> StartReport {
+    fn report(&self, missing: u64) -> StartReport {
         StartReport {
             runs: self.runs.load(Ordering::Relaxed),
             simulated_s: self.simulated_ms.load(Ordering::Relaxed) as f64 * 1e-3,
             wall_s: self.began.elapsed().as_secs_f64(),
-            missing: 0,
+            missing,
         }
     }
 }

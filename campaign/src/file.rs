@@ -237,7 +237,6 @@ fn kind(root: &mut Section<'_>) -> Result<Kind, SettingsError> {
     }))
 }
 
-/// Checks a factor against the kind of campaign and the factors before it.
 fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), String> {
     let Factor { name, changes, .. } = factor;
     if before
@@ -271,7 +270,6 @@ fn check_factor(factor: &Factor, kind: &Kind, before: &[Factor]) -> Result<(), S
     }
 }
 
-/// Checks that a column may have this name beside those that are `taken`.
 fn check_column(name: &str, taken: &[&str]) -> Result<(), String> {
     if taken.contains(&name) {
         return Err(format!("\"{name}\": another column of the result has this name, choose another"));

@@ -47,10 +47,6 @@ impl Folders {
         }
     }
 
-    fn experiment(&self, name: &str) -> PathBuf {
-        self.file(name, "experiments", &self.campaign)
-    }
-
     /// A program as an experiment names it.
     fn program(&self, name: &str, experiment: &Path) -> PathBuf {
         self.file(name, "programs", experiment.parent().unwrap_or(Path::new("")))
@@ -109,17 +105,15 @@ impl CampaignInputs {
         }
         let mut experiments = BTreeMap::new();
         for name in kind.experiment.clone().into_iter().chain(chosen(FileChoice::Experiment)) {
-            experiments.insert(name.clone(), read(folders.experiment(&name))?);
+            experiments.insert(name.clone(), read(folders.file(&name, "experiments", &folders.campaign))?);
         }
         let first = |keys: Option<&String>| keys.cloned().unwrap_or_default();
         let defaults = [first(experiments.keys().next()), first(rigs.keys().next())];
         let mut programs = BTreeMap::new();
-        let mut add = |path: PathBuf| match Source::read(&path) {
-            Ok(source) => {
-                programs.insert(path, source);
-                Ok(())
-            }
-            Err(reported) => Err(error(reported.to_string())),
+        let mut add = |path: PathBuf| {
+            let source = Source::read(&path).map_err(|reported| error(reported.to_string()))?;
+            programs.insert(path, source);
+            Ok::<_, InputsError>(())
         };
         let stroke_m = rigs[&defaults[1]].nominal.cylinder().stroke_m;
         for TextFile { path, text } in experiments.values() {
@@ -188,7 +182,6 @@ impl CampaignInputs {
     }
 }
 
-/// The files that factors with this choice name.
 fn names(factors: &[Factor], choice: FileChoice) -> Vec<String> {
     let lists = factors.iter().filter(|factor| factor.changes == Changes::File(choice));
     lists

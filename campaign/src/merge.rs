@@ -11,7 +11,6 @@ use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-/// Why parts are not merged.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum MergeError {
     #[error(
@@ -37,13 +36,11 @@ pub(crate) struct Results {
     pub simulated_s: f64,
     /// Numbers by the name of their column; NaN where a run has none.
     numbers: BTreeMap<String, Vec<f64>>,
-    /// Categorical columns by their name.
     words: BTreeMap<String, CategoricalColumn>,
     /// The first [`MAX_REPORTED`] runs that were not completed.
     pub incomplete_runs: Vec<IncompleteRun>,
 }
 
-/// A run that was not completed.
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) struct IncompleteRun {
     pub run: u64,

@@ -31,7 +31,12 @@ pub(crate) fn page(campaign: &Campaign, results: &Results, repeat: &dyn Fn(u64) 
     body += &heat::section(campaign, results, &shown);
     body += &confusion::section(campaign, results);
     body += &worst::section(campaign, results, &shown, repeat);
-    body += &file_section(campaign);
+    let _ = write!(
+        body,
+        "<h2>The campaign's file</h2>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"File\"><pre>{}</pre>\
+         </div>\n",
+        escaped(&campaign.file.text)
+    );
     document(&campaign.file.title, &body)
 }
 
@@ -84,14 +89,6 @@ fn endings(results: &Results) -> String {
         rows.push(vec!["kept the experiment's bounds".to_owned(), share(kept)]);
     }
     format!("<h2>How the runs ended</h2>\n{}", Grid::new(["runs", "how many"], rows).html())
-}
-
-fn file_section(campaign: &Campaign) -> String {
-    format!(
-        "<h2>The campaign's file</h2>\n<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"File\"><pre>{}</pre>\
-         </div>\n",
-        escaped(&campaign.file.text)
-    )
 }
 
 /// A value with its display unit.

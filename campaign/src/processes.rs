@@ -20,7 +20,6 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Why a run of processes has no result.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ProcessesError {
     #[error("stopped")]

@@ -9,27 +9,24 @@ use pagekit::page::escaped;
 pub(super) fn section(campaign: &Campaign, results: &Results) -> String {
     let mut text = String::new();
     for [truth, answer] in &campaign.file.confusion {
-        let (Some(rows), Some(columns)) = (labels(results, truth), labels(results, answer)) else { continue };
-        let mut counts = vec![vec![0_u64; columns.known.len()]; rows.known.len()];
-        for (row, column) in rows.places.iter().zip(&columns.places) {
+        let (Some((rows, of_row)), Some((columns, of_column))) =
+            (labels(results, truth), labels(results, answer))
+        else {
+            continue;
+        };
+        let mut counts = vec![vec![0_u64; columns.len()]; rows.len()];
+        for (row, column) in of_row.iter().zip(&of_column) {
             counts[*row][*column] += 1;
         }
-        let right: u64 = rows
-            .known
-            .iter()
-            .enumerate()
-            .filter_map(|(row, word)| {
-                Some(counts[row][columns.known.iter().position(|other| other == word)?])
-            })
-            .sum();
-        let head =
-            std::iter::once(format!("{truth} \\ {answer}")).chain(columns.known.iter().cloned()).collect();
+        let of_both = |(row, word): (usize, &String)| Some(counts[row][columns.binary_search(word).ok()?]);
+        let right: u64 = rows.iter().enumerate().filter_map(of_both).sum();
+        let head = std::iter::once(format!("{truth} \\ {answer}")).chain(columns.iter().cloned()).collect();
         let line = |(word, counts): (&String, &Vec<u64>)| {
             let cells =
                 counts.iter().map(|count| if *count == 0 { "·".to_owned() } else { count.to_string() });
             std::iter::once(word.clone()).chain(cells).collect()
         };
-        let rows = rows.known.iter().zip(&counts).map(line).collect();
+        let rows = rows.iter().zip(&counts).map(line).collect();
         text += &format!(
             "<h2>{} and {}</h2>\n<p>The same in {right} of {} runs.</p>\n{}",
             escaped(truth),
@@ -42,12 +39,7 @@ pub(super) fn section(campaign: &Campaign, results: &Results) -> String {
 }
 
 /// The distinct values of a column, sorted, and the index of each run's value.
-struct Labels {
-    known: Vec<String>,
-    places: Vec<usize>,
-}
-
-fn labels(results: &Results, name: &str) -> Option<Labels> {
+fn labels(results: &Results, name: &str) -> Option<(Vec<String>, Vec<usize>)> {
     let words: Vec<String> = match results.words(name) {
         Some(words) => words.places.iter().map(|place| words.known[*place as usize].clone()).collect(),
         None => results.numbers(name)?.iter().map(ToString::to_string).collect(),
@@ -57,5 +49,5 @@ fn labels(results: &Results, name: &str) -> Option<Labels> {
     known.dedup();
     // Each word is among those that are known.
     let places = words.iter().filter_map(|word| known.binary_search(word).ok()).collect();
-    Some(Labels { known, places })
+    Some((known, places))
 }
