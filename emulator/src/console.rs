@@ -21,7 +21,6 @@ use std::io::{self, BufRead, Read};
 /// Capacity of the command queue; a piped file waits for the loop.
 const QUEUE: usize = 16;
 
-/// Help text with all commands.
 pub(crate) const HELP: &str = "stop | release        the rig's own emergency stop; others release theirs
 link | unlink         the load's eye in the carriage
 weights KG            weights on the carriage, in all
@@ -35,7 +34,6 @@ quit                  ends the run; everything is saved";
 /// A command to the rig loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Command {
-    /// An action on the rig.
     Act(Action),
     /// A hand pushes in +x from now on.
     Hand {
@@ -151,7 +149,8 @@ fn parse(line: &str, limits: Limits) -> Result<Option<Line>, String> {
         }
         ["mend", "all"] => Ok(Some(Line::Command(Command::Mend(None)))),
         ["mend", name, ref rest @ ..] if rest.len() < 2 => {
-            Ok(Some(Line::Command(Command::Mend(Some(like(name, rest)?)))))
+            let like = Fault::like(name, rest.first().copied()).map_err(|error| error.to_string())?;
+            Ok(Some(Line::Command(Command::Mend(Some(like)))))
         }
         ["weights", kg] => {
             act(Action::Weights { added_mass_kg: number("weights", kg, (0.0, limits.added_limit_kg), "kg")? })
@@ -190,11 +189,6 @@ fn fault(name: &str, words: &[&str], limits: Limits) -> Result<Fault, String> {
     Ok(fault)
 }
 
-/// The fault of this name at this place, without numbers.
-fn like(name: &str, place: &[&str]) -> Result<Fault, String> {
-    Fault::like(name, place.first().copied()).map_err(|error| error.to_string())
-}
-
 fn number(what: &str, text: &str, (least, most): (f64, f64), unit: &str) -> Result<f64, String> {
     // A NaN is in no range.
     let value = text.parse().ok().filter(|value: &f64| (least..=most).contains(value));
@@ -207,7 +201,6 @@ mod tests {
 
     const LIMITS: Limits = Limits { added_limit_kg: 20.0, hosts_bus: true };
 
-    /// Commands and answers of a whole input.
     fn run_console(input: &str) -> (Vec<Command>, Vec<String>) {
         let (console, receiver) = open(LIMITS);
         let mut answers = Vec::new();

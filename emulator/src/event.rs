@@ -3,18 +3,10 @@
 use crate::faults::mark::Mark;
 use plant::scene::{HandForces, Outcome};
 use runlog::Axis;
-use runlog::event::{self, FaultMark};
-use serde::{Serialize, Serializer};
+use runlog::event;
 
 pub(crate) type Event = event::Event<Mark>;
 pub(crate) type EventKind = event::EventKind<Mark>;
-
-/// Serialised as the [`FaultMark`] that others read.
-impl Serialize for Mark {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        FaultMark::from(*self).serialize(serializer)
-    }
-}
 
 pub(crate) fn of_outcome(outcome: Outcome) -> EventKind {
     match outcome {

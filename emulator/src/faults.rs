@@ -35,7 +35,6 @@ pub struct Fault {
     pub(crate) values: [f64; MOST_KEYS],
 }
 
-/// Why a fault is invalid.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum FaultError {
     #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are{near}", near = of_the_kind(.0))]

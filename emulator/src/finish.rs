@@ -28,7 +28,6 @@ pub(crate) fn finish(
     Ok(exit)
 }
 
-/// Prints the run in a few lines.
 fn print_summary(summary: &Summary<Event>, folder: &Path) {
     let Summary { overruns, frames_sent, frames_received, frames_malformed, stale_commands, .. } = summary;
     let (cycles, skipped) = (summary.cycles.unwrap_or_default(), summary.skipped.unwrap_or_default());

@@ -6,7 +6,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 
-/// A host in its own thread.
 pub(crate) struct HostThread {
     stop: Arc<AtomicBool>,
     thread: JoinHandle<std::io::Result<HostReport>>,

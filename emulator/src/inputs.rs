@@ -39,7 +39,8 @@ impl Inputs {
             .map_err(|error| RunError::Input(error.to_string()))?;
         wire_limits::check(&parameters).map_err(|misfit| {
             let line = line_of_key(&rig_toml, misfit.table, misfit.key);
-            RunError::Input(format!("{}: {misfit}", place(rig, line)))
+            let line = line.map_or_else(String::new, |line| format!(":{line}"));
+            RunError::Input(format!("{}{line}: {misfit}", rig.display()))
         })?;
         let experiment_toml = experiment.map(read).transpose()?;
         let scene = match (&experiment_toml, experiment) {
@@ -63,7 +64,6 @@ impl Inputs {
     }
 }
 
-/// A fault script.
 pub(crate) struct Script {
     /// Text of the file.
     pub toml: String,
@@ -73,7 +73,6 @@ pub(crate) struct Script {
 }
 
 impl Script {
-    /// Reads and checks the file.
     pub(crate) fn read(path: &Path) -> Result<Self, RunError> {
         let (toml, file) = (read(path)?, path.display().to_string());
         let script =
@@ -98,11 +97,6 @@ impl Script {
 fn named_by(experiment: Option<&Path>, scene: &Scene) -> Option<PathBuf> {
     let folder = experiment.and_then(Path::parent).unwrap_or(Path::new(""));
     scene.sealed.as_ref().map(|sealed| folder.join(sealed))
-}
-
-/// `file:line`, or the file alone.
-fn place(file: &Path, line: Option<usize>) -> String {
-    line.map_or_else(|| file.display().to_string(), |line| format!("{}:{line}", file.display()))
 }
 
 /// Line, from 1, of `key` in `[table]`; `None` for a default.

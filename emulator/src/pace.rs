@@ -41,7 +41,6 @@ impl fmt::Display for Pace {
     }
 }
 
-/// Why a run ended.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum RunEnd {
     ControllersDone,

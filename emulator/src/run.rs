@@ -95,15 +95,12 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     // Lockstep uses simulated time, so that the log does not depend on the machine.
     let simulated_ns = Arc::new(AtomicU64::new(0));
     let OpenedBus { mut bus, host, orders } = open_bus(arguments, stamp_clock(lockstep, &simulated_ns))?;
-    if let Err(error) = script.as_ref().map_or(Ok(()), |script| script.check_host(orders.is_some())) {
-        host.map(HostThread::stop);
-        return Err(error);
-    }
+    let checked = script.as_ref().map_or(Ok(()), |script| script.check_host(orders.is_some()));
     let started = RunStart::now(lockstep);
     let limits =
         console::Limits { added_limit_kg: inputs.rig.mass().added_limit_kg, hosts_bus: orders.is_some() };
     let (console, typed) = arguments.console.then(|| console::open(limits)).unzip();
-    let writer = match open_folder(arguments, &inputs, &started, console.clone()) {
+    let writer = match checked.and_then(|()| open_folder(arguments, &inputs, &started, console.clone())) {
         Ok(writer) => writer,
         Err(error) => {
             host.map(HostThread::stop);
@@ -149,7 +146,6 @@ pub(crate) fn watch_interrupt() -> Result<Interrupt, RunError> {
     Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }
 
-/// Watches for all signals of a run.
 fn watch_signals() -> Result<Shared, RunError> {
     let refused = |error| RunError::Input(format!("cannot watch for SIGUSR1 and SIGCONT: {error}"));
     Ok(Shared {
@@ -182,7 +178,6 @@ impl RunStart {
     }
 }
 
-/// Results of the rig loop.
 pub(crate) struct LoopOutcome {
     pub(crate) paced: RunOutcome,
     pub(crate) figures: NodeFigures,

@@ -9,7 +9,7 @@ use plant::effects::draw::{AxisSelection, as_toml, draw};
 use std::fs::OpenOptions;
 use std::io::{self, Write};
 use std::os::unix::fs::OpenOptionsExt;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Mode of the sealed file: readable and writable by its owner alone.
 const MODE: u32 = 0o600;
@@ -23,17 +23,14 @@ pub(crate) fn seal(arguments: &SealArguments) -> Result<String, RunError> {
     let drawn = draw(*seed, usize::from(*effects), among(*axis))
         .map_err(|error| RunError::Input(format!("--effects {effects}: {error}")))?;
     let text = format!("{}{}", head(arguments), as_toml(&drawn));
+    let file = out.display().to_string();
     match write_new(out, text.as_bytes()) {
-        Ok(()) => {}
-        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {
-            let file = out.display();
-            return Err(RunError::Input(format!(
-                "--out {file}: the file is there already; move it away or choose another name"
-            )));
-        }
-        Err(error) => return Err(RunError::output(out, &error)),
+        Ok(()) => Ok(file),
+        Err(error) if error.kind() == io::ErrorKind::AlreadyExists => Err(RunError::Input(format!(
+            "--out {file}: the file is there already; move it away or choose another name"
+        ))),
+        Err(error) => Err(RunError::output(out, &error)),
     }
-    Ok(out.display().to_string())
 }
 
 fn among(axis: SealedAxis) -> AxisSelection {
@@ -58,7 +55,9 @@ fn head(arguments: &SealArguments) -> String {
 
 /// Writes to a temporary file in the same folder, then links it to the name unless that exists.
 fn write_new(path: &Path, text: &[u8]) -> io::Result<()> {
-    let temporary = temporary(path);
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    let temporary = path.with_file_name(name);
     let mut file = OpenOptions::new().write(true).create_new(true).mode(MODE).open(&temporary)?;
     let written = file
         .write_all(text)
@@ -69,12 +68,6 @@ fn write_new(path: &Path, text: &[u8]) -> io::Result<()> {
     written
 }
 
-fn temporary(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    path.with_file_name(name)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -82,6 +75,7 @@ mod tests {
     use plant::effects::SHEETS;
     use protocol::exit::Exit;
     use std::os::unix::fs::PermissionsExt;
+    use std::path::PathBuf;
 
     fn arguments(out: PathBuf, seed: u64) -> SealArguments {
         SealArguments { seed, effects: 3, axis: SealedAxis::Both, out }

@@ -55,17 +55,14 @@ fn as_json() -> Value {
 
 /// All faults in the form of programs.
 pub(crate) fn faults() -> Vec<FaultEntry> {
-    all().map(fault).collect()
-}
-
-fn fault(spec: &FaultSpec) -> FaultEntry {
-    FaultEntry {
+    let entry = |spec: &FaultSpec| FaultEntry {
         fault: spec.name.to_owned(),
         group: spec.group,
         about: spec.about.to_owned(),
         places: spec.places.names(),
         keys: spec.keys.to_vec(),
-    }
+    };
+    all().map(entry).collect()
 }
 
 /// The table of `emulator/docs/faults.md`.

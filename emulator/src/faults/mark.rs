@@ -17,8 +17,9 @@ pub(crate) enum Cause {
     Console,
 }
 
-/// A fault that began, ended, or could not.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// A fault that began, ended, or could not; serialised as the [`FaultMark`] that others read.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(into = "FaultMark")]
 pub(crate) struct Mark {
     /// Its number in this run; the script's are those of the file, from 1.
     pub number: u16,

@@ -60,7 +60,6 @@ pub struct ScheduledFault {
     pub(crate) until: Option<FaultEnd>,
 }
 
-/// End of a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum FaultEnd {
     Cycle(u64),
@@ -209,79 +208,63 @@ mod tests {
 
     #[test]
     fn what_is_wrong_is_told_with_line_key_value_and_what_is_allowed() {
+        let (none, fault) = ("", "[[fault]]\n");
         let stuck = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\n";
         let offset = "[[fault]]\nname = \"valve-offset\"\nat = \"drive\"\n";
-        for (text, expected) in [
-            ("x = 1\n".to_owned(), "f.toml:1: unknown key x; allowed is seed, fault"),
-            ("[[fault]\n".to_owned(), "f.toml:1: not TOML:"),
+        for (head, rest, expected) in [
+            (none, "x = 1\n", "1: unknown key x; allowed is seed, fault"),
+            (none, "[[fault]\n", "1: not TOML:"),
+            (none, "seed = -1\n", "1: seed = -1; allowed is a whole number, 0 to 9000000000000000"),
+            (none, "fault = 3\n", "1: fault = 3; allowed is a list of tables: [[fault]]"),
+            (fault, "at = \"drive\"\n", "1: fault[1].name is missing: 'emulator faults' lists them"),
+            (fault, "name = 3\n", "2: fault[1].name = 3; allowed is a text"),
             (
-                "seed = -1\n".to_owned(),
-                "f.toml:1: seed = -1; allowed is a whole number, 0 to 9000000000000000",
-            ),
-            ("fault = 3\n".to_owned(), "f.toml:1: fault = 3; allowed is a list of tables: [[fault]]"),
-            (
-                "[[fault]]\nat = \"drive\"\n".to_owned(),
-                "f.toml:1: fault[1].name is missing: 'emulator faults' lists them",
-            ),
-            ("[[fault]]\nname = 3\n".to_owned(), "f.toml:2: fault[1].name = 3; allowed is a text"),
-            (
-                "[[fault]]\nname = \"valve\"\n".to_owned(),
-                "f.toml:2: fault 'valve' is unknown; 'emulator faults' lists those that there are, such as valve-",
+                fault,
+                "name = \"valve\"\n",
+                "2: fault 'valve' is unknown; 'emulator faults' lists those that there are, such as valve-",
             ),
             (
-                "[[fault]]\nname = \"volve-stuck\"\n".to_owned(),
-                "f.toml:2: fault 'volve-stuck' is unknown; 'emulator faults' lists those that there are",
+                fault,
+                "name = \"volve-stuck\"\n",
+                "2: fault 'volve-stuck' is unknown; 'emulator faults' lists those that there are",
             ),
             (
-                "[[fault]]\nname = \"valve-stuck\"\nat = \"both\"\n".to_owned(),
-                "f.toml:3: at = 'both': valve-stuck is at one of drive, load",
+                fault,
+                "name = \"valve-stuck\"\nat = \"both\"\n",
+                "3: at = 'both': valve-stuck is at one of drive, load",
+            ),
+            (fault, "name = \"valve-stuck\"\n", "1: at = '': valve-stuck is at one of drive, load"),
+            (offset, "", "1: valve-offset needs offset; allowed: -1 to 1"),
+            (offset, "offset = 1.5\n", "4: offset = 1.5: allowed: -1 to 1"),
+            (offset, "offset = nan\n", "4: offset = nan: allowed: -1 to 1"),
+            (offset, "offset = \"x\"\n", "4: offset = \"x\": allowed: -1 to 1"),
+            (offset, "offset = 0.1\ngain = 2\n", "5: unknown key gain = 2; valve-offset has offset"),
+            (stuck, "gain = 2\n", "4: unknown key gain = 2; valve-stuck has no numbers"),
+            (stuck, "from_s = -1\n", "4: fault[1].from_s = -1 s; allowed is 0 to 100000 s"),
+            (stuck, "from_s = inf\n", "4: fault[1].from_s = inf s; allowed is 0 to 100000 s"),
+            (
+                stuck,
+                "from_s = 1\nto_s = 1\n",
+                "5: fault[1].to_s = 1; to_s must be at least 0.001 s after from_s",
+            ),
+            (stuck, "to_s = 1\nfor_s = 1\n", "5: fault[1].for_s = 1; to_s and for_s exclude each other"),
+            (stuck, "above = 1\n", "4: fault[1].above = 1; above and below belong to a condition"),
+            (stuck, "when = \"x\"\n", "4: fault[1].when = \"x\"; allowed is drive.position_m, "),
+            (stuck, "when = \"drive.valve\"\n", "4: fault[1].when = \"drive.valve\"; a condition has either"),
+            (
+                stuck,
+                "when = \"drive.valve\"\nabove = nan\n",
+                "5: fault[1].above = nan; allowed is a finite number",
             ),
             (
-                "[[fault]]\nname = \"valve-stuck\"\n".to_owned(),
-                "f.toml:1: at = '': valve-stuck is at one of drive, load",
-            ),
-            (offset.to_owned(), "f.toml:1: valve-offset needs offset; allowed: -1 to 1"),
-            (format!("{offset}offset = 1.5\n"), "f.toml:4: offset = 1.5: allowed: -1 to 1"),
-            (format!("{offset}offset = nan\n"), "f.toml:4: offset = nan: allowed: -1 to 1"),
-            (format!("{offset}offset = \"x\"\n"), "f.toml:4: offset = \"x\": allowed: -1 to 1"),
-            (
-                format!("{offset}offset = 0.1\ngain = 2\n"),
-                "f.toml:5: unknown key gain = 2; valve-offset has offset",
-            ),
-            (format!("{stuck}gain = 2\n"), "f.toml:4: unknown key gain = 2; valve-stuck has no numbers"),
-            (format!("{stuck}from_s = -1\n"), "f.toml:4: fault[1].from_s = -1 s; allowed is 0 to 100000 s"),
-            (format!("{stuck}from_s = inf\n"), "f.toml:4: fault[1].from_s = inf s; allowed is 0 to 100000 s"),
-            (
-                format!("{stuck}from_s = 1\nto_s = 1\n"),
-                "f.toml:5: fault[1].to_s = 1; to_s must be at least 0.001 s after from_s",
-            ),
-            (
-                format!("{stuck}to_s = 1\nfor_s = 1\n"),
-                "f.toml:5: fault[1].for_s = 1; to_s and for_s exclude each other",
-            ),
-            (
-                format!("{stuck}above = 1\n"),
-                "f.toml:4: fault[1].above = 1; above and below belong to a condition",
-            ),
-            (
-                format!("{stuck}when = \"x\"\n"),
-                "f.toml:4: fault[1].when = \"x\"; allowed is drive.position_m, ",
-            ),
-            (
-                format!("{stuck}when = \"drive.valve\"\n"),
-                "f.toml:4: fault[1].when = \"drive.valve\"; a condition has either",
-            ),
-            (
-                format!("{stuck}when = \"drive.valve\"\nabove = nan\n"),
-                "f.toml:5: fault[1].above = nan; allowed is a finite number",
-            ),
-            (
-                "[[fault]]\nname = \"bus-delay\"\ndelay_ms = 1.5\n".to_owned(),
-                "f.toml:3: delay_ms = 1.5: allowed: whole numbers from 1 to 10000 ms",
+                fault,
+                "name = \"bus-delay\"\ndelay_ms = 1.5\n",
+                "3: delay_ms = 1.5: allowed: whole numbers from 1 to 10000 ms",
             ),
         ] {
+            let (text, expected) = (format!("{head}{rest}"), format!("f.toml:{expected}"));
             let message = read(&text).unwrap_err().to_string();
-            assert!(message.starts_with(expected), "{text}\nsays {message}\nnot  {expected}");
+            assert!(message.starts_with(&expected), "{text}\nsays {message}\nnot  {expected}");
         }
     }
 }

@@ -19,7 +19,6 @@ const EARLY_FRAMES: usize = 256;
 /// Cycles within which a rig that meets another one knows that it is the later one.
 const NEWCOMER_CYCLES: u64 = 10 * STALE_AFTER_CYCLES;
 
-/// Runs the rig on `clock`.
 pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: PeriodicConfig) -> RunOutcome {
     let start = clock.now() + CYCLE;
     let mut periodic = PeriodicLoop::new(&clock, config, start);

@@ -61,7 +61,6 @@ impl RigTiming {
         })
     }
 
-    /// Records the time stamps of a cycle.
     pub(crate) fn timing(&mut self, record: &TimingRecord) -> io::Result<()> {
         match record {
             TimingRecord::Cycle { row, axes } => self.cycle(row, axes),
@@ -100,7 +99,6 @@ impl RigTiming {
         }
     }
 
-    /// Records a frame sent or received.
     pub(crate) fn frame(&mut self, record: &FrameRecord) {
         let spec = record.frame.standard_id().and_then(MessageSpec::by_id);
         self.recorder.frame(*record, spec.is_some_and(|spec| spec.sender != RIG_STATUS.sender));

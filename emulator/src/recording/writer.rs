@@ -181,7 +181,6 @@ impl Writer {
         timing.poll(MonotonicClock.now(), asked)
     }
 
-    /// Serves the viewers of the telemetry.
     fn serve(&mut self) {
         let Some(telemetry) = &mut self.setup.telemetry else { return };
         if let Some(timing) = &mut self.timing {
