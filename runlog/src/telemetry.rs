@@ -124,7 +124,7 @@ pub enum TelemetryError {
 /// # Panics
 /// When the payload is longer than [`LONGEST_PAYLOAD`]: only a description could be, which has a tenth of it.
 pub fn write_packet(out: &mut Vec<u8>, kind: Kind, payload: &[u8]) {
-    write_head(out, kind, payload.len());
+    out.extend(head_of(kind, payload.len()));
     out.extend(payload);
 }
 
@@ -134,7 +134,7 @@ pub fn write_packet(out: &mut Vec<u8>, kind: Kind, payload: &[u8]) {
 /// As [`write_packet`].
 pub fn write_cycle(out: &mut Vec<u8>, cycle: u64, values: impl IntoIterator<Item = f64>) {
     let head = out.len();
-    write_head(out, Kind::Cycle, 0);
+    out.extend(head_of(Kind::Cycle, 0));
     out.extend(cycle.to_le_bytes());
     values.into_iter().for_each(|value| out.extend(value.to_le_bytes()));
     let payload = out.len() - head - HEAD;
@@ -171,10 +171,6 @@ pub fn write_loss(out: &mut Vec<u8>, lost: u64) {
     write_packet(out, Kind::Loss, &lost.to_le_bytes());
 }
 
-fn write_head(out: &mut Vec<u8>, kind: Kind, payload: usize) {
-    out.extend(head_of(kind, payload));
-}
-
 fn head_of(kind: Kind, payload: usize) -> [u8; HEAD] {
     assert!(payload <= LONGEST_PAYLOAD, "{kind:?} of {payload} bytes");
     let [a, b, c, d] = (payload as u32).to_le_bytes();
@@ -198,8 +194,9 @@ impl Decoder {
     /// # Errors
     /// [`TelemetryError`] when the stream is none of telemetry; it stays so.
     pub fn packet(&mut self) -> Result<Option<Packet>, TelemetryError> {
-        let Some(head) = self.front::<HEAD>() else { return Ok(None) };
-        let [a, b, c, d, number] = head;
+        let Some(&[a, b, c, d, number]) = self.bytes.make_contiguous().first_chunk::<HEAD>() else {
+            return Ok(None);
+        };
         let length = u32::from_le_bytes([a, b, c, d]) as usize;
         if length > LONGEST_PAYLOAD {
             return Err(TelemetryError::TooLong(length));
@@ -210,15 +207,6 @@ impl Decoder {
         }
         let payload = self.bytes.drain(..HEAD + length).skip(HEAD).collect();
         read(kind, payload).map(Some)
-    }
-
-    fn front<const N: usize>(&self) -> Option<[u8; N]> {
-        let mut front = self.bytes.iter().copied();
-        let mut bytes = [0; N];
-        for byte in &mut bytes {
-            *byte = front.next()?;
-        }
-        Some(bytes)
     }
 }
 
