@@ -135,7 +135,6 @@ impl BroadcastManager {
         }
     }
 
-    /// Processes a frame received on an interface.
     pub(crate) fn take_frame(
         &mut self,
         interface: u32,
@@ -148,7 +147,7 @@ impl BroadcastManager {
 
     /// Due time of the next job.
     pub(crate) fn due(&self) -> Option<Instant> {
-        let sending = self.transmissions.iter().filter_map(Transmission::due);
+        let sending = self.transmissions.iter().filter_map(|job| job.due);
         sending.chain(self.subscriptions.iter().filter_map(Subscription::due)).min()
     }
 

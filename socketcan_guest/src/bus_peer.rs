@@ -33,9 +33,8 @@ pub(crate) enum SendResult {
     Down,
 }
 
-/// A peer on an embedded bus.
 pub(crate) struct BusPeer {
-    path: PathBuf,
+    pub(crate) path: PathBuf,
     socket: Option<OwnedFd>,
     next_attempt: Instant,
 }
@@ -43,10 +42,6 @@ pub(crate) struct BusPeer {
 impl BusPeer {
     pub(crate) fn new(path: &Path) -> Self {
         Self { path: path.into(), socket: None, next_attempt: Instant::now() }
-    }
-
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
     }
 
     /// The socket while there is a host.

@@ -39,7 +39,6 @@ impl Caller {
         moved(copied, bytes.len())
     }
 
-    /// Reads an array.
     pub(crate) fn read_array<const N: usize>(self, address: u64) -> Result<[u8; N], Errno> {
         let mut bytes = [0; N];
         self.read(address, &mut bytes)?;

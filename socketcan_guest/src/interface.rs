@@ -85,7 +85,6 @@ impl Interface {
     }
 }
 
-/// The interface that a request names.
 pub(crate) fn named<'a>(interfaces: &'a [Interface], request: &[u8; REQUEST_BYTES]) -> Option<&'a Interface> {
     let field = &request[..NAME_BYTES];
     let end = field.iter().position(|byte| *byte == 0).unwrap_or(NAME_BYTES - 1);

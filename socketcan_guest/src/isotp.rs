@@ -57,13 +57,10 @@ pub(crate) enum Event {
     Reply(FrameBytes),
     /// A message is complete.
     Received(Vec<u8>),
-    /// The reception of a message failed.
     ReceivingFailed(Errno),
-    /// The transmission of a message failed.
     SendingFailed(Errno),
 }
 
-/// Identifiers of the frames of both directions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Identifiers {
     pub(crate) sent: u32,

@@ -131,7 +131,7 @@ fn wait_for_hosts(
         let Some(missing) = interfaces.iter().find(|interface| interface.bus.socket().is_none()) else {
             return Ok(true);
         };
-        let path = missing.bus.path().display().to_string();
+        let path = missing.bus.path.display().to_string();
         if Instant::now() >= until {
             let waited_s = patience.as_secs();
             return Err(GuestError::NoHost { name: missing.name.clone(), path, waited_s });
@@ -185,8 +185,7 @@ fn serve_the_start(
         match reports.try_recv() {
             Ok(StartReport::Program(Ok(child))) => return Ok(child),
             Ok(StartReport::Program(Err(error))) => return Err(failed(error)),
-            Ok(StartReport::Listening(_)) => {}
-            Err(TryRecvError::Empty) => {}
+            Ok(StartReport::Listening(_)) | Err(TryRecvError::Empty) => {}
             Err(TryRecvError::Disconnected) => {
                 return Err(failed(io::Error::other("the thread that starts it has ended")));
             }

@@ -62,7 +62,6 @@ const ADDRESS_BYTES: u32 = 12;
 const LONGEST_DATAGRAM: usize = 1 << 16;
 /// Most requests with pending answers; the oldest is dropped for a new one.
 const MOST_REQUESTS: usize = 64;
-/// Longest request that is parsed.
 const LONGEST_REQUEST: usize = 1024;
 
 /// A request for links that a guest has sent.

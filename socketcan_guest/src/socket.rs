@@ -59,7 +59,6 @@ pub(crate) enum Kind {
     Transport(Box<Transport>),
 }
 
-/// A CAN socket of a guest.
 pub(crate) struct GuestSocket {
     /// This process's end of the pair of sockets; the guest holds the other one.
     end: OwnedFd,
@@ -177,7 +176,6 @@ impl GuestSocket {
         }
     }
 
-    /// Metadata of the message that is read next.
     pub(crate) fn next_metadata(&mut self) -> Option<MessageMetadata> {
         self.forget_read_notes();
         self.metadata.front().map(|(metadata, _)| *metadata)
@@ -205,7 +203,6 @@ impl GuestSocket {
         let _ = rustix::net::sockopt::set_socket_send_buffer_size(&self.end, bytes);
     }
 
-    /// Its options when it is a raw socket.
     pub(crate) fn raw(&self) -> Option<&RawOptions> {
         match &self.kind {
             Kind::Raw(options) => Some(options),

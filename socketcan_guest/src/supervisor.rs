@@ -367,7 +367,6 @@ impl Supervisor {
         self.forget_dead_senders();
     }
 
-    /// Drops waiting calls that have ended.
     fn end_waiting(&mut self, is_over: impl Fn(&Listener, &WaitingCall) -> bool) {
         let mut left = 0;
         for socket in self.sockets.values_mut() {
@@ -437,7 +436,6 @@ impl Supervisor {
         }
     }
 
-    /// Prints a warning, each text once.
     pub(crate) fn warn_once(&mut self, text: &str) {
         if self.warned.len() < MOST_TEXTS && self.warned.insert(text.to_owned()) {
             eprintln!("bench can: {text}");
@@ -450,7 +448,6 @@ pub(crate) fn inode_of(descriptor: BorrowedFd<'_>) -> Option<u64> {
     rustix::fs::fstat(descriptor).ok().map(|found| found.st_ino)
 }
 
-/// The wall clock, ns.
 pub(crate) fn wall_clock_ns() -> u64 {
     let now = clock_gettime(ClockId::Realtime);
     now.tv_sec as u64 * 1_000_000_000 + now.tv_nsec as u64

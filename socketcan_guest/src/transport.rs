@@ -169,7 +169,6 @@ impl Supervisor {
         self.watch_socket(inode, false);
     }
 
-    /// Sockets of the same channel.
     fn others_of_channel(&self, inode: u64) -> impl Iterator<Item = (u64, &GuestSocket, &Transport)> {
         let channel =
             |socket: &GuestSocket| Some((socket.interface?, socket.transport()?.protocol.identifiers?));
@@ -348,7 +347,6 @@ impl Supervisor {
 }
 
 impl GuestSocket {
-    /// Its transport protocol, if it has one.
     pub(crate) fn transport(&self) -> Option<&Transport> {
         match &self.kind {
             Kind::Transport(transport) => Some(transport),

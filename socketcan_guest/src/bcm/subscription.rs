@@ -132,12 +132,8 @@ impl Subscription {
         }
         let data = |frame: &FrameBytes| u64_at(frame, 8);
         match self.frames.as_slice() {
-            [] => self.note_change(0, frame, now, actions),
-            [mask] => {
-                if self.differs(0, mask, frame) {
-                    self.note_change(0, frame, now, actions);
-                }
-            }
+            [mask] if !self.differs(0, mask, frame) => {}
+            [] | [_] => self.note_change(0, frame, now, actions),
             [mux, rest @ ..] => {
                 let (mux, received) = (data(mux), data(frame));
                 let entry = rest.iter().position(|entry| mux & received == mux & data(entry));

@@ -72,7 +72,6 @@ fn sent(at: u128, data: &[u8]) -> (u128, Action) {
     (at, Action::Send(INTERFACE, frame(0x123, data)))
 }
 
-/// Opcode and frames of each notification.
 fn notifications(actions: &[Action]) -> Vec<(u32, Vec<FrameBytes>)> {
     let read = |action: &Action| match action {
         Action::Notify(_, bytes) => Head::read(bytes).map(|(head, frames)| (head.opcode, frames)).ok(),

@@ -14,9 +14,8 @@ pub(super) struct Transmission {
     head: Head,
     /// The list; a further set-up may not have more frames.
     frames: Vec<FrameBytes>,
-    /// Index of the frame that is sent next.
     next_frame: usize,
-    due: Option<Instant>,
+    pub(super) due: Option<Instant>,
 }
 
 impl Transmission {
@@ -28,10 +27,6 @@ impl Transmission {
 
     pub(super) fn is(&self, head: &Head, interface: u32) -> bool {
         self.head.id == head.id && self.interface == interface
-    }
-
-    pub(super) fn due(&self) -> Option<Instant> {
-        self.due
     }
 
     pub(super) fn status(&self) -> Vec<u8> {

@@ -9,7 +9,6 @@ use std::time::{Duration, Instant};
 const LONGEST_IN_12_BITS: usize = 4095;
 /// Time until the next attempt at a full interface.
 const RETRY: Duration = Duration::from_millis(1);
-/// Bytes of a flow control frame.
 const FLOW_CONTROL_BYTES: usize = 3;
 
 #[derive(Clone, Copy, Debug, Default)]

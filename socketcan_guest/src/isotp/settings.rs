@@ -189,7 +189,6 @@ impl Settings {
         data
     }
 
-    /// The data of a flow control frame.
     pub(super) fn flow_control_of(&self, status: u8) -> Vec<u8> {
         let [block_size, stmin, _] = self.flow_control;
         self.data_of(&[super::kind::FLOW_CONTROL | status, block_size, stmin], &[])
