@@ -15,9 +15,9 @@ use crate::slave::{BLOCK_PACKETS, TextLocations};
 use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, STATUS};
 use crate::{EVENT_NAME, identifiers};
 use a2lfile::{
-    A2lFile, A2lObjectName, AddrType, Characteristic, CharacteristicType, CompuMethod, CompuTabRef,
-    CompuVtab, ConversionType, DataType, EcuAddress, FncValues, Group, IndexMode, MatrixDim, Measurement,
-    Module, ReadOnly, RecordLayout, RefCharacteristic, RefMeasurement, Root, ValuePairsStruct,
+    A2lObjectName, AddrType, Characteristic, CharacteristicType, CompuMethod, CompuTabRef, CompuVtab,
+    ConversionType, DataType, EcuAddress, FncValues, Group, IndexMode, MatrixDim, Measurement, Module,
+    ReadOnly, RecordLayout, RefCharacteristic, RefMeasurement, Root, ValuePairsStruct,
 };
 use axis_control::program::Variable;
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -102,13 +102,10 @@ pub fn text(described: &AxisDescription<'_>) -> Result<String, A2lError> {
     builder.signals();
     builder.trace();
     builder.groups();
-    checked(&file, warnings).map_err(error)?;
+    if let Some(problem) = warnings.into_iter().chain(file.check()).next() {
+        return Err(error(problem.to_string()));
+    }
     Ok(file.write_to_string())
-}
-
-fn checked(file: &A2lFile, mut problems: Vec<a2lfile::A2lError>) -> Result<(), String> {
-    problems.extend(file.check());
-    problems.first().map_or(Ok(()), |problem| Err(problem.to_string()))
 }
 
 fn frame(described: &AxisDescription<'_>) -> String {
@@ -371,7 +368,6 @@ impl A2lBuilder<'_> {
     }
 }
 
-/// Address, format and conversion of a value.
 struct ValueLocation {
     address: u32,
     format: Format,

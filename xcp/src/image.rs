@@ -133,7 +133,6 @@ impl Image {
         Ok(())
     }
 
-    /// Whether `count` bytes can be read from `address` on.
     pub(crate) fn check_readable(&self, address: u32, count: u32) -> Result<(), Refusal> {
         self.reach(address, count).map(|_| ())
     }
@@ -311,7 +310,6 @@ pub(super) mod tests {
     use super::*;
     use settings::parameters::{Parameter, declare};
 
-    /// Actions that record their calls.
     #[derive(Default)]
     pub(crate) struct ActionLog {
         pub(crate) set: Vec<(usize, f64)>,

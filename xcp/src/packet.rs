@@ -101,7 +101,6 @@ impl<'a> Fields<'a> {
         Ok(u32::from(low) | u32::from(high) << 16)
     }
 
-    /// `count` bytes from `at` on.
     pub(crate) fn bytes(self, at: usize, count: usize) -> Result<&'a [u8], Refusal> {
         self.0.get(at..at + count).ok_or(Refusal::Syntax)
     }

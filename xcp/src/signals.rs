@@ -52,10 +52,8 @@ impl Format {
 
 /// The data of a cycle that signals are taken from.
 pub(crate) struct CycleData<'a> {
-    /// Input of its algorithm.
     pub(crate) input: &'a AlgorithmInput,
     pub(crate) sensors: &'a Sensors,
-    /// The row of its record.
     pub(crate) record: AxisRecord,
 }
 

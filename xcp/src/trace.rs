@@ -73,7 +73,6 @@ pub(crate) fn control_format(place: usize) -> Format {
     if CONTROLS[place].whole { Format::Long } else { Format::Double }
 }
 
-/// Names of the states.
 pub(crate) const STATES: &[&str] = &["idle", "filling", "armed", "triggered", "ready"];
 
 /// State of the trigger buffer.
