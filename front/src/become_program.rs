@@ -24,7 +24,6 @@ const PROGRAMS: [Program; 7] = [
     Program { command: "close", program: "discrepancy", first: &["close"] },
 ];
 
-/// The program of a command, if it is one.
 pub(crate) fn named(command: &str) -> Option<&'static Program> {
     PROGRAMS.iter().find(|program| program.command == command)
 }

@@ -6,11 +6,11 @@ use protocol::socket_file::{Reservation, SocketType};
 use std::fs::{self, DirBuilder};
 use std::io::ErrorKind;
 use std::os::unix::fs::DirBuilderExt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A folder for sockets that is removed with all its files on drop.
 #[derive(Debug)]
-pub(crate) struct PrivateFolder(PathBuf);
+pub(crate) struct PrivateFolder(pub(crate) PathBuf);
 
 impl PrivateFolder {
     /// Below `$XDG_RUNTIME_DIR`, else below the temporary folder.
@@ -31,10 +31,6 @@ impl PrivateFolder {
         unreachable!("a number that no folder has")
     }
 
-    pub(crate) fn path(&self) -> &Path {
-        &self.0
-    }
-
     /// URL of the embedded bus whose socket lies in the folder.
     pub(crate) fn bus(&self) -> String {
         format!("unix://{}/bus0", self.0.display())
@@ -47,7 +43,6 @@ impl Drop for PrivateFolder {
     }
 }
 
-/// The bus of a run, with its folder and its reservation.
 #[derive(Default)]
 pub(crate) struct RunBus {
     /// URL of the bus, `can://…` or `unix://…`.

@@ -86,7 +86,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
                 Some(folder) => folder,
                 None => private.insert(PrivateFolder::make()?),
             };
-            let telemetry = folder.path().join("telemetry");
+            let telemetry = folder.0.join("telemetry");
             start_page(&mut run.children, &bench, [&bus, &arguments.http], &telemetry)?;
             emulate.arg("--console").arg("--telemetry").arg(telemetry);
         }

@@ -53,11 +53,9 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judgement, FrontErr
     for hidden in hidden.iter().filter(|hidden| !is_named(hidden)) {
         let indistinguishable = alternatives.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
         if indistinguishable && alternatives.len() <= MOST_ALTERNATIVES {
-            verdict = if verdict == "right" {
-                "right, among those that this record cannot tell apart"
-            } else {
-                verdict
-            };
+            if verdict == "right" {
+                verdict = "right, among those that this record cannot tell apart";
+            }
             continue;
         }
         right = false;
