@@ -53,21 +53,17 @@ fn run(options: &Options) -> Result<(), Box<dyn Error>> {
     let started = SystemTime::now().duration_since(UNIX_EPOCH)?;
     let clock = MonotonicClock;
     let mut periodic = PeriodicLoop::new(clock, *config, clock.now() + Duration::from_millis(10));
-    let mut stopped = None;
-    loop {
+    let stopped = loop {
         match periodic.next_cycle() {
             Ok(cycle) => {
                 periodic.end_of_work();
                 if cycle.index + 1 >= cycles {
-                    break;
+                    break None;
                 }
             }
-            Err(overrun) => {
-                stopped = Some(overrun);
-                break;
-            }
+            Err(overrun) => break Some(overrun),
         }
-    }
+    };
     drop(grants);
     if let Some(overrun) = stopped {
         println!("{overrun}");

@@ -9,7 +9,6 @@ use hdrhistogram::Histogram;
 use hdrhistogram::serialization::Deserializer;
 use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 
-/// A line's histogram.
 pub(crate) fn histogram(encoded: &str) -> Histogram<u64> {
     let bytes = from_base64(encoded);
     Deserializer::new().deserialize(&mut &bytes[..]).expect("a histogram")
