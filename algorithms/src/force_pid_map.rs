@@ -83,7 +83,6 @@ struct Memory {
 }
 
 impl ForcePidMap {
-    /// For a rig of these nominal numbers.
     fn new(rig: &RigParameters) -> Self {
         Self {
             air: Air::new(rig),

@@ -71,7 +71,6 @@ pub(super) fn check(kind: &Kind) {
     TestRunner::default().run(&inputs, claim).unwrap_or_else(|error| panic!("{}: {error}", kind.name));
 }
 
-/// Name of a parameter and its value.
 pub(super) type ParameterOverride = (&'static str, f64);
 
 /// A control error that the valve cannot remove, and the reversed error that follows.

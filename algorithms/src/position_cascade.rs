@@ -76,7 +76,6 @@ struct PositionCascade {
 }
 
 impl PositionCascade {
-    /// For a rig of these nominal numbers.
     fn new(rig: &RigParameters) -> Self {
         Self {
             air: Air::new(rig),

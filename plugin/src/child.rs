@@ -99,7 +99,6 @@ pub fn run(library: &Path) -> Exit {
     }
 }
 
-/// Output of a child.
 struct ChildOutput {
     tail: Arc<Mutex<Vec<u8>>>,
     /// Signalled when the pipe has ended.

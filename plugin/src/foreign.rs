@@ -27,7 +27,6 @@ use std::ptr::NonNull;
 
 const ENTRY: &[u8] = b"airbench_algorithm_entry\0";
 
-/// Description and functions of a library, all checked.
 pub(super) struct CheckedLibrary {
     pub(super) description: Description,
     create: Create,

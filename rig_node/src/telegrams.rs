@@ -48,7 +48,6 @@ pub(crate) struct SaturatedSensors {
 }
 
 impl SaturatedSensors {
-    /// Takes note of a sample.
     pub(crate) fn note(&mut self, readings: &AxisReadings) {
         self.position |= readings.position.saturated;
         self.force |= readings.force.saturated;
