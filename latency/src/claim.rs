@@ -189,8 +189,7 @@ fn unlike_reference(run: &RunFiles) -> Vec<String> {
     let interval = reference::option(line, 'i', "interval").unwrap_or(INTERVAL_US);
     compare("an interval in us of", Some(interval), Some(INTERVAL_US.to_owned()));
     let length_s = reported.samples.count() as f64 * interval.parse::<f64>().unwrap_or_default() * 1e-6;
-    let share = length_s / run.duration_s();
-    if !SAME_LENGTH.contains(&share) {
+    if !SAME_LENGTH.contains(&(length_s / run.duration_s())) {
         let ours_s = run.duration_s();
         unlike.push(format!("A reference of {length_s:.0} s stands beside a run of {ours_s:.0} s."));
     }

@@ -216,10 +216,8 @@ mod tests {
     fn a_sentence_follows_from_the_type_of_its_fact() {
         let policy =
             |governor| FrequencyPolicy::Policy { cpus: "CPUs 0".into(), governor, range: String::new() };
-        let of_policy = |policy| {
-            let machine = Machine { frequency_governors: vec![policy], ..Machine::default() };
-            governors(&machine).concat()
-        };
+        let of_policy =
+            |policy| governors(&Machine { frequency_governors: vec![policy], ..Machine::default() }).concat();
         assert_eq!(of_policy(policy(Governor::Performance)), "");
         assert!(of_policy(policy(Governor::Other("schedutil".into()))).contains("CPUs 0 is schedutil"));
         assert_eq!(of_policy(FrequencyPolicy::Other("?".into())), governors(&Machine::default()).concat());

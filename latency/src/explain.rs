@@ -63,7 +63,11 @@ pub(crate) fn events(place_of_run: usize, run: &RunFiles) -> Vec<Event> {
         run.rows.iter().map(|(process, rows)| (process.as_str(), late_rows(process, rows, run))).collect();
     let mut events = Vec::new();
     for (process, late_rows) in &late {
-        for cluster in clusters(late_rows, &run.rows[*process]) {
+        let rows = &run.rows[*process];
+        let near = |before: &LateCycle, after: &LateCycle| {
+            rows[after.place].cycle - after.missed <= rows[before.place].cycle + CLUSTER_CYCLES
+        };
+        for cluster in late_rows.chunk_by(near) {
             events.push(event(place_of_run, process, cluster, run, &late));
         }
     }
@@ -152,13 +156,6 @@ fn missed_by_controller(place: usize, process: &str, run: &RunFiles, lost: u64) 
     (missed, first_ns.min(row.due_ns))
 }
 
-fn clusters<'a>(late: &'a [LateCycle], rows: &[CycleTiming]) -> Vec<&'a [LateCycle]> {
-    let near = |before: &LateCycle, after: &LateCycle| {
-        rows[after.place].cycle - after.missed <= rows[before.place].cycle + CLUSTER_CYCLES
-    };
-    late.chunk_by(near).collect()
-}
-
 fn event(
     place_of_run: usize,
     process: &str,
@@ -211,8 +208,7 @@ fn lateness_evidence(
     let others = all_late.iter().filter(|(other, _)| *other != process).filter_map(|(other, late)| {
         let rows = run.rows[*other].as_slice();
         let worst = late.iter().filter(|late| same_time(late, rows)).max_by_key(|late| late.severity_ns())?;
-        let waited_ns = rows[worst.place].vitals.run_delay_ns;
-        Some(((*other).to_owned(), worst.severity_ns(), waited_ns))
+        Some(((*other).to_owned(), worst.severity_ns(), rows[worst.place].vitals.run_delay_ns))
     });
     let covered = |want: &dyn Fn(&&Gap) -> bool| {
         let gaps = run.gaps.as_deref().unwrap_or_default().iter().filter(want);

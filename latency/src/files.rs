@@ -117,8 +117,7 @@ impl RunFiles {
 
     /// The text of a file, nothing when it is not there.
     fn text(&mut self, name: &str) -> Option<String> {
-        let path = self.folder.join(name);
-        match std::fs::read_to_string(&path) {
+        match std::fs::read_to_string(self.folder.join(name)) {
             Ok(text) => Some(text),
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => None,
             Err(error) => {

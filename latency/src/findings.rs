@@ -238,8 +238,7 @@ fn slow_listener(runs: &[RunFiles]) -> Option<Finding> {
 /// Frames that never came, by gaps in the counters at rig and controllers.
 pub(crate) fn lost_by_gaps(run: &RunFiles) -> u64 {
     let at_rig = run.counted().map_or(0, |summary| {
-        let by_axis = summary.drive_commands.lost + summary.load_commands.lost;
-        summary.frames_lost_at_rig.unwrap_or(by_axis)
+        summary.frames_lost_at_rig.unwrap_or(summary.drive_commands.lost + summary.load_commands.lost)
     });
     let of_process =
         |report: &ControllerReport| report.axes.values().filter_map(|axis| axis.sensors_lost).sum::<u64>();

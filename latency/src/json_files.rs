@@ -58,7 +58,6 @@ pub(crate) struct ControllerFile {
 }
 
 impl SummaryFile {
-    /// From the file's content; `None` for null, which counts as missing.
     pub(crate) fn of(json: Value) -> Option<Self> {
         let (summary, misfit) = typed(&json)?;
         Some(Self {
@@ -73,7 +72,6 @@ impl SummaryFile {
 }
 
 impl RunFile {
-    /// From the file's content; `None` for null, which counts as missing.
     pub(crate) fn of(json: Value) -> Option<Self> {
         let (description, misfit) = typed(&json)?;
         Some(Self {
@@ -87,7 +85,6 @@ impl RunFile {
 }
 
 impl ControllerFile {
-    /// From the file's content; `None` for null, which counts as missing.
     pub(crate) fn of(json: Value) -> Option<Self> {
         let (report, misfit) = typed(&json)?;
         Some(Self {
@@ -101,7 +98,7 @@ impl ControllerFile {
     }
 }
 
-/// A file as its type; the empty type with the reason where it does not fit, `None` for null.
+/// A file as its type; the empty type with the reason where it does not fit, `None` for null, which counts as missing.
 fn typed<T: DeserializeOwned + Default>(json: &Value) -> Option<(T, Option<String>)> {
     (!json.is_null()).then(|| match T::deserialize(json) {
         Ok(file) => (file, None),

@@ -112,8 +112,7 @@ fn ping_pongs() -> impl Iterator<Item = Kind> {
 
 /// The kind of a tag; one that is not known is shown after the others, with its tag for a name.
 pub fn of(tag: &str) -> Kind {
-    let known = all().into_iter().find(|kind| kind.tag == tag);
-    known.unwrap_or_else(|| {
+    all().into_iter().find(|kind| kind.tag == tag).unwrap_or_else(|| {
         let prefix = |(process, source, _): &(Process, Source, &str)| {
             tag.starts_with(process.name()).then_some(*source)
         };

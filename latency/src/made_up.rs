@@ -122,8 +122,7 @@ fn shifted(reported: Exchange, cycle: u64) -> Exchange {
         return reported;
     }
     let spread = |cycle: u64| cycle * 37 % 5_000;
-    let command_ns = reported.command_ns + spread(cycle - 1) - spread(cycle);
-    Exchange { command_ns, ..reported }
+    Exchange { command_ns: reported.command_ns + spread(cycle - 1) - spread(cycle), ..reported }
 }
 
 /// Makes a process wake this late in a cycle, missing those in between, and gives the row of its first cycle after.

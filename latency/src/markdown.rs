@@ -74,14 +74,10 @@ fn us(ns: Option<u64>) -> String {
     ns.map_or_else(|| "-".into(), |ns| format!("{:.1}", ns as f64 * 1e-3))
 }
 
-fn percentile_cells(reported: &PercentilesNs) -> Vec<String> {
-    let PercentilesNs { p50, p90, p99, p999, p9999, max, count } = reported;
-    [p50, p90, p99, p999, p9999, max].into_iter().map(|ns| us(*ns)).chain([count.to_string()]).collect()
-}
-
 fn percentiles(distributions: &[Distribution]) -> Grid {
     let row = |distribution: &Distribution| {
-        let cells = percentile_cells(&distribution.percentiles_ns);
+        let PercentilesNs { p50, p90, p99, p999, p9999, max, count } = distribution.percentiles_ns;
+        let cells = [p50, p90, p99, p999, p9999, max].map(us).into_iter().chain([count.to_string()]);
         std::iter::once(distribution.shown_name()).chain(cells).collect()
     };
     Grid::new(["us"].into_iter().chain(PERCENTILES), distributions.iter().map(row))
@@ -100,8 +96,7 @@ fn ratios(ratios: &[Ratio]) -> String {
     if ratios.is_empty() {
         return String::new();
     }
-    let head = ["ratio", "median", "interval of the median", "pairs"];
-    Grid::new(head, ratios.iter().map(row)).markdown()
+    Grid::new(["ratio", "median", "interval of the median", "pairs"], ratios.iter().map(row)).markdown()
 }
 
 fn bounds(bounds: &[BoundResult]) -> String {

@@ -98,8 +98,7 @@ mod tests {
 
     #[test]
     fn gaps_are_read_and_what_is_wrong_is_named_with_its_line() {
-        let text = "cpu,from_ns,to_ns,another_ran\n1,100,250,0\n0,300,400,1\n1,5";
-        let gaps = read(text).unwrap();
+        let gaps = read("cpu,from_ns,to_ns,another_ran\n1,100,250,0\n0,300,400,1\n1,5").unwrap();
         assert_eq!(gaps[0], Gap { cpu: 1, from_ns: 100, to_ns: 250, another_ran: false });
         assert_eq!(gaps.len(), 2);
         assert_eq!([gaps[0].within_ns(200, 900), gaps[0].within_ns(300, 900)], [50, 0]);

@@ -161,7 +161,6 @@ mod tests {
 
     #[test]
     fn numbers_of_pairs_are_told_with_two_digits() {
-        let reported = [7, 40, 335, 11_111, 99_999].map(two_digits);
-        assert_eq!(reported, [7, 40, 340, 12_000, 100_000]);
+        assert_eq!([7, 40, 335, 11_111, 99_999].map(two_digits), [7, 40, 340, 12_000, 100_000]);
     }
 }

@@ -28,8 +28,7 @@ pub(crate) fn frames(runs: &[RunPart]) -> Option<Grid> {
         rows.push(row(format!("{place} at the rig"), run.frame_faults.rig));
         rows.push(row(format!("{place} at the controllers"), run.frame_faults.controllers));
     }
-    let head = ["run, receiver", "lost", "late", "duplicate", "malformed"];
-    (!rows.is_empty()).then(|| Grid::new(head, rows))
+    (!rows.is_empty()).then(|| Grid::new(["run, receiver", "lost", "late", "duplicate", "malformed"], rows))
 }
 
 fn row(name: String, counts: FrameFaultCounts) -> Vec<String> {

@@ -160,7 +160,6 @@ fn a_run_of_the_flight_recorder_alone_has_its_events_explained() {
         made_up::write(&window, &dump);
         std::fs::rename(dump.join("emulator-timing.csv"), dump.join("timing.csv")).unwrap();
     }
-    let report = made_in(folder.path()).report;
-    let causes: Vec<_> = report.worst.iter().map(|event| event.cause).collect();
+    let causes: Vec<_> = made_in(folder.path()).report.worst.iter().map(|event| event.cause).collect();
     assert_eq!(causes, [Cause::EmulatorStopped, Cause::MachineStoodStill]);
 }

@@ -97,10 +97,7 @@ fn first_that_holds(lateness: &LatenessEvidence) -> Cause {
     }
     let cpu_was_free = lateness.probe_watched == ProbeCoverage::Watched
         && lateness.still_ns.max(lateness.another_ns).saturating_mul(4) < bad_ns;
-    if cpu_was_free || !lateness.knows_run_delay {
-        return Cause::Unexplained;
-    }
-    Cause::MachineStoodStill
+    if cpu_was_free || !lateness.knows_run_delay { Cause::Unexplained } else { Cause::MachineStoodStill }
 }
 
 impl LatenessEvidence {

@@ -117,8 +117,7 @@ fn rows(event: &Event, place: usize) -> String {
     let mut table = Table::new(label, head);
     let mut left_out = 0;
     for (process, cycles) in by_process(event) {
-        let room = MOST_ROWS / event.nearby_cycles.len().max(1);
-        let shown = nearest(cycles, room);
+        let shown = nearest(cycles, MOST_ROWS / event.nearby_cycles.len().max(1));
         left_out += cycles.len() - shown.len();
         for row in shown {
             let is_hit = process == event.process && row.cycle == event.cycle;

@@ -140,8 +140,7 @@ fn axis(scale: &Scale, bottom: f64) -> String {
         if !(LEFT + 0.5..WIDTH - 20.5).contains(&at) {
             continue;
         }
-        let is_one = value == 1.0;
-        drawn += &stroke(if is_one { "edge" } else { "grid" }, (at, TOP - 8.0), (at, bottom));
+        drawn += &stroke(if value == 1.0 { "edge" } else { "grid" }, (at, TOP - 8.0), (at, bottom));
         if at - free > 34.0 {
             drawn += &label("middle", (at, bottom + 17.0), &format!("{value}"));
             free = at;

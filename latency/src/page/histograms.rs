@@ -48,10 +48,7 @@ pub(super) fn charts(
     // What comes first is looked at first.
     let sizes = std::iter::once(&FULL).chain(std::iter::repeat(&HALF));
     let charts: String = families.iter().zip(sizes).map(|(family, size)| chart(family, size)).collect();
-    if charts.is_empty() {
-        return none(without);
-    }
-    format!("<div class=\"charts\">\n{charts}</div>\n")
+    if charts.is_empty() { none(without) } else { format!("<div class=\"charts\">\n{charts}</div>\n") }
 }
 
 /// A figure: heading, drawing, and its legend if it needs one. The legend stands below: drawings side by side stand level.

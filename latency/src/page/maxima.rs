@@ -5,7 +5,7 @@
 
 use super::families::Family;
 use super::histograms::{FOOT, LEFT, RIGHT, Size, charts, figure};
-use crate::model::{Distribution, Maximum, Report};
+use crate::model::{Distribution, Report};
 use pagekit::number;
 use pagekit::svg::{CurveStyle, Drawing, Point, Scale, line, stroke, text, whole_decades};
 
@@ -40,10 +40,6 @@ impl RunStarts {
 
     fn are_several(&self) -> bool {
         self.starts_s.len() > 1
-    }
-
-    fn at_s(&self, maximum: &Maximum) -> f64 {
-        self.starts_s.get(maximum.run).copied().unwrap_or(0) as f64 + maximum.second as f64
     }
 }
 
@@ -135,7 +131,8 @@ fn trace(style: CurveStyle, distribution: &Distribution, x: &Scale, y: &Scale, r
     let mut drawn = String::new();
     for maxima in distribution.maxima.chunk_by(|one, next| one.run == next.run) {
         let seconds = maxima.iter().map(|maximum| {
-            let start_s = runs.at_s(maximum);
+            let run_s = runs.starts_s.get(maximum.run).copied().unwrap_or(0);
+            let start_s = run_s as f64 + maximum.second as f64;
             PlottedSecond { from: x.at(start_s), to: x.at(start_s + 1.0), y: y.at(maximum.max_ns as f64) }
         });
         let seconds = thinned(&seconds.collect::<Vec<_>>());

@@ -44,7 +44,8 @@ fn window(event: &Event) -> (f64, f64) {
     let room_us = 0.5 * length_us;
     let starts = event.nearby_cycles.values().flatten().map(|row| row.due_us);
     let first_us = starts.filter(|start| start.is_finite()).fold(0.0, f64::min);
-    let ends = event.nearby_cycles.values().flatten().map(end_us).chain(gap_ends(&event.probe));
+    let gap_ends = event.probe.iter().map(|gap| gap.from_us + gap.length_us);
+    let ends = event.nearby_cycles.values().flatten().map(end_us).chain(gap_ends);
     let last_us = ends.filter(|end| end.is_finite()).fold(length_us, f64::max);
     let rim_us = 0.1 * BEFORE_US + 0.02 * length_us;
     let to_us = last_us.min(length_us + room_us.max(AFTER_US)) + rim_us;
@@ -53,10 +54,6 @@ fn window(event: &Event) -> (f64, f64) {
 
 fn end_us(row: &NearbyCycle) -> f64 {
     row.due_us + row.late_us + row.execution_us
-}
-
-fn gap_ends(gaps: &[ProbeGap]) -> impl Iterator<Item = f64> {
-    gaps.iter().map(|gap| gap.from_us + gap.length_us)
 }
 
 /// Lateness of the event's own cycles, each at its due time: the rig writes no row for a cycle that it missed, only for the
@@ -172,14 +169,11 @@ fn time_grid(x: &Scale, bottom: f64) -> String {
     for value in x.round_values(12.0) {
         let at = x.at(value);
         drawn += &stroke(if value == 0.0 { "cut" } else { "grid" }, (at, TOP), (at, bottom));
-        drawn += &text("middle", (at, bottom + 18.0), &short(value));
+        // Whole milliseconds without a point.
+        let places = if value.fract() == 0.0 { 0 } else { 1 };
+        drawn += &text("middle", (at, bottom + 18.0), &number::decimal(value, places));
     }
     drawn
-}
-
-/// Whole milliseconds without a point.
-fn short(value: f64) -> String {
-    number::decimal(value, if value.fract() == 0.0 { 0 } else { 1 })
 }
 
 /// Lateness and execution of each cycle.

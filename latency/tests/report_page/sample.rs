@@ -34,8 +34,7 @@ fn distribution(name: &str, source: Source, about: &str, middle_ns: f64) -> Dist
     for run in 0..RUNS {
         for second in 0..SECONDS {
             let samples: Vec<_> = (0..200).map(|_| random.latency_ns(middle_ns)).collect();
-            let max_ns = samples.iter().copied().max().unwrap_or_default();
-            maxima.push(Maximum { run, second, max_ns });
+            maxima.push(Maximum { run, second, max_ns: samples.iter().copied().max().unwrap_or_default() });
             samples.iter().for_each(|ns| all.record(*ns, 1));
         }
     }
