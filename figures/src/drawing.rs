@@ -6,7 +6,6 @@
 
 use crate::series::{Series, Span};
 use plotters::coord::Shift;
-use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::*;
 pub use plotters::style::BLACK;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
@@ -213,8 +212,11 @@ impl Picture {
         }
         let pixel = (high - low) / f64::from(PANEL_BODY);
         for curve in &panel.curves {
+            let style =
+                ShapeStyle { color: curve.colour.to_rgba(), filled: false, stroke_width: curve.width };
             for piece in pieces(&curve.samples) {
-                draw_line(&mut chart, curve, thinned(&piece, |time| self.column(time) as usize, pixel))?;
+                let samples = thinned(&piece, |time| self.column(time) as usize, pixel);
+                chart.draw_series(LineSeries::new(samples, style))?;
             }
         }
         Ok(())
@@ -231,14 +233,6 @@ fn tick(value: f64, length_value: f64) -> String {
     } else {
         text
     }
-}
-
-type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
-
-fn draw_line(chart: &mut Chart<'_, '_>, curve: &Curve, samples: Vec<(f64, f64)>) -> Result<(), Failure> {
-    let style = ShapeStyle { color: curve.colour.to_rgba(), filled: false, stroke_width: curve.width };
-    chart.draw_series(LineSeries::new(samples, style))?;
-    Ok(())
 }
 
 const LEGEND_FONT: f64 = 14.0;

@@ -86,13 +86,6 @@ pub struct Family {
     compute: fn(&Record, &mut Figures),
 }
 
-impl Family {
-    /// Whether it is measured over the whole run.
-    fn is_of_run(&self) -> bool {
-        self.definitions.iter().all(|definition| definition.worst == Worst::Run)
-    }
-}
-
 /// All families, in the order in which they are listed.
 pub(crate) const FAMILIES: &[Family] = &[
     position::FAMILY,
@@ -142,7 +135,8 @@ impl Figures {
 pub fn of(record: &Record) -> Figures {
     let computed = |record: &Record, of_run: bool| {
         let mut figures = Figures::default();
-        let families = FAMILIES.iter().filter(|family| family.is_of_run() == of_run);
+        let is_of_run = |family: &Family| family.definitions.iter().all(|known| known.worst == Worst::Run);
+        let families = FAMILIES.iter().filter(|family| is_of_run(family) == of_run);
         families.for_each(|family| (family.compute)(record, &mut figures));
         figures.values
     };

@@ -160,11 +160,6 @@ mod tests {
     use super::*;
     use serde_json::{Value, json};
 
-    /// `summary.json` of a joined run, as others read it.
-    fn summary_of(joined: &Joined) -> Value {
-        in_order(&joined.summary)
-    }
-
     /// A folder with these files besides what an emulator that ended well leaves.
     fn folder(files: &[(&str, Value)]) -> tempfile::TempDir {
         let folder = tempfile::tempdir().unwrap();
@@ -202,7 +197,7 @@ mod tests {
             std::fs::write(folder.path().join(name), runlog::golden::text(name)).unwrap();
         }
         let joined = join(folder.path()).unwrap();
-        runlog::golden::check("summary.keys", &runlog::golden::keys(&summary_of(&joined)));
+        runlog::golden::check("summary.keys", &runlog::golden::keys(&in_order(&joined.summary)));
     }
 
     #[test]
@@ -210,10 +205,10 @@ mod tests {
         let folder = folder(&[("controller.json", both(&json!({})))]);
         let joined = join(folder.path()).unwrap();
         assert!(joined.passed());
-        assert_eq!(summary_of(&joined)["frames_lost"], 2);
-        assert_eq!(summary_of(&joined)["position_error_dynamic_m"], 0.002);
+        assert_eq!(in_order(&joined.summary)["frames_lost"], 2);
+        assert_eq!(in_order(&joined.summary)["position_error_dynamic_m"], 0.002);
         assert_eq!(in_order(&joined.run)["controller"], json!({ "title": "position-p" }));
-        assert_eq!(summary_of(&join(folder.path()).unwrap()), summary_of(&joined));
+        assert_eq!(in_order(&join(folder.path()).unwrap().summary), in_order(&joined.summary));
     }
 
     #[test]
@@ -223,11 +218,11 @@ mod tests {
         let load = json!({ "ended_well": false, "axes": { "load": { "sensors_lost": 4 } } });
         let folder = folder(&[("controller-drive.json", drive), ("controller-load.json", load)]);
         let joined = join(folder.path()).unwrap();
-        assert_eq!(summary_of(&joined)["frames_lost_at_controller"], 7);
-        assert_eq!(summary_of(&joined)["position_error_dynamic_m"], 0.002);
-        assert_eq!(summary_of(&joined)["controllers"]["load"]["ended_well"], false);
+        assert_eq!(in_order(&joined.summary)["frames_lost_at_controller"], 7);
+        assert_eq!(in_order(&joined.summary)["position_error_dynamic_m"], 0.002);
+        assert_eq!(in_order(&joined.summary)["controllers"]["load"]["ended_well"], false);
         let against = json!(["the load controller did not end well", "bound broken: frames_lost"]);
-        assert_eq!(summary_of(&joined)["not_passed_because"], against);
+        assert_eq!(in_order(&joined.summary)["not_passed_because"], against);
     }
 
     #[test]
@@ -261,7 +256,7 @@ mod tests {
         ] {
             let folder = folder(&[("summary.json", summary), ("controller.json", both(&controller))]);
             let joined = join(folder.path()).unwrap();
-            assert_eq!(summary_of(&joined)["not_passed_because"], against);
+            assert_eq!(in_order(&joined.summary)["not_passed_because"], against);
             assert_eq!(joined.passed(), against == json!([]), "{against}");
         }
     }
@@ -278,8 +273,8 @@ mod tests {
             let at = format!("{summary} {controller}");
             let files = [("summary.json", summary), ("controller.json", controller), ("run.json", json!({}))];
             let joined = join(folder(&files).path()).unwrap();
-            assert_eq!(summary_of(&joined)["frames_lost_at_controller"], at_controller, "{at}");
-            assert_eq!(summary_of(&joined)["frames_lost"], in_all, "{at}");
+            assert_eq!(in_order(&joined.summary)["frames_lost_at_controller"], at_controller, "{at}");
+            assert_eq!(in_order(&joined.summary)["frames_lost"], in_all, "{at}");
             assert!(!joined.passed());
             assert!(crate::table::table(&joined).contains("frames lost"));
         }
@@ -312,7 +307,7 @@ mod tests {
     fn without_a_controller_a_bound_on_its_figure_is_not_kept() {
         let joined = join(folder(&[]).path()).unwrap();
         assert!(!joined.passed());
-        assert_eq!(summary_of(&joined)["thresholds"]["position_error_dynamic_m"]["value"], Value::Null);
+        assert_eq!(in_order(&joined.summary)["thresholds"]["position_error_dynamic_m"]["value"], Value::Null);
     }
 
     #[test]
@@ -320,7 +315,10 @@ mod tests {
         let run = json!({ "pace": "rehearsal" });
         let summary = json!({ "passed": false, "cycles": 5 });
         let joined = join(folder(&[("run.json", run), ("summary.json", summary)]).path()).unwrap();
-        assert_eq!(summary_of(&joined)["not_passed_because"], json!(["the rehearsal did not end well"]));
+        assert_eq!(
+            in_order(&joined.summary)["not_passed_because"],
+            json!(["the rehearsal did not end well"])
+        );
         let table = crate::table::table(&joined);
         assert!(table.contains("none: rehearsal, no bus"), "{table}");
     }

@@ -133,11 +133,6 @@ impl Record {
         }
     }
 
-    /// The experiment with the waiting before and after it.
-    fn experiments_and_settling(&self) -> Vec<Span> {
-        self.leader().in_state("main_chain", &["settling", "experiment", "final-settling"])
-    }
-
     /// The drive's set-point less its position, as its controller saw it.
     pub fn position_error(&self) -> Series {
         self.drive.numbers("set_position_m").minus(self.drive.numbers("position_m"))
@@ -151,10 +146,9 @@ impl Record {
 
     /// The stretches in which the drive's set-point rests at one place, in the experiment and in the waiting around it.
     pub fn rests(&self) -> Vec<Span> {
-        let resting = common(
-            &self.drive.numbers("moving").stretches(|flag| flag == 0.0),
-            &self.experiments_and_settling(),
-        );
+        let with_settling = ["settling", "experiment", "final-settling"];
+        let experiments = self.leader().in_state("main_chain", &with_settling);
+        let resting = common(&self.drive.numbers("moving").stretches(|flag| flag == 0.0), &experiments);
         let places = self.drive.numbers("set_position_m");
         resting.iter().flat_map(|span| places.within(span).constant_stretches()).collect()
     }

@@ -162,8 +162,7 @@ mod tests {
             .map(|entry| (entry.state.as_str(), entry.span.from_s, entry.span.to_s))
             .collect();
         assert_eq!(reported, [("settling", 0.0, 0.2), ("experiment", 0.2, 0.3), ("done", 0.3, 0.4)]);
-        let both = read.in_state("s", &["settling", "experiment"]);
-        assert_eq!(both, [Span { from_s: 0.0, to_s: 0.3 }]);
+        assert_eq!(read.in_state("s", &["settling", "experiment"]), [Span { from_s: 0.0, to_s: 0.3 }]);
     }
 
     #[test]

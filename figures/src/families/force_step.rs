@@ -64,8 +64,7 @@ fn compute(record: &Record, figures: &mut Figures) {
     let set_point = record.load.numbers("set_force_N");
     let Some(step) = largest_step(set_point, &record.experiments(), LEAST_STEP_N) else { return };
     figures.put("force_step_n", Some(step.height_value()));
-    let force = record.measured.numbers("load_force_N").smoothed(NOISE_S);
-    force_figures(&force, &step, figures);
+    force_figures(&record.measured.numbers("load_force_N").smoothed(NOISE_S), &step, figures);
     drive_figures(record, &step, figures);
 }
 

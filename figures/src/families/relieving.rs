@@ -61,8 +61,7 @@ mod tests {
         load.set_states("main_chain", chain(main));
         load.set_states("force_chain", chain(force_chain));
         let force = each_ms(0.0, 3.0, |time| 400.0 * (-(time - 1.0).max(0.0) / 0.2).exp());
-        let measured = table(&[("load_force_N", &force)]);
-        super::super::of(&Record { load, measured, ..Record::default() })
+        super::super::of(&Record { load, measured: table(&[("load_force_N", &force)]), ..Record::default() })
     }
 
     #[test]
