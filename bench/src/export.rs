@@ -117,8 +117,8 @@ fn as_signals(
         mdf4::write(path, &signals, origin_ns).map_err(|error| written(&error))?;
         format!(" in {} groups", signals.messages.len())
     };
-    let reported = format!("{channels} signals of {frames} frames{rows}; time counts from {}", origin(log));
-    Ok((reported, Exit::Good))
+    let origin = if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" };
+    Ok((format!("{channels} signals of {frames} frames{rows}; time counts from {origin}"), Exit::Good))
 }
 
 /// The signals of a log; warns of frames without signals.
@@ -132,10 +132,6 @@ fn signals_of(log: &RecordedLog, consequence: &str) -> Signals {
     signals
 }
 
-fn origin(log: &RecordedLog) -> &'static str {
-    if log.cycle_zero_ns.is_some() { "cycle 0" } else { "the first frame" }
-}
-
 fn as_recording(part: &Path, log: &RecordedLog) -> Result<ExportResult, ExportError> {
     let signals = signals_of(log, "are in /can alone");
     let mcap::WriteCounts { channels, messages } = mcap::write(part, log, &signals, run_folder(log))?;
@@ -147,8 +143,7 @@ fn as_trace(part: &Path, log: &RecordedLog) -> Result<ExportResult, ExportError>
     if cycles == 0 {
         warn("no cycles: their timing is recorded in real time, by --full-timing of emulator and controller");
     }
-    let reported = format!("{frames} frames, {cycles} cycles, {faults} marks of faults");
-    Ok((reported, Exit::Good))
+    Ok((format!("{frames} frames, {cycles} cycles, {faults} marks of faults"), Exit::Good))
 }
 
 /// The run's folder if its tables can be aligned with the log; warns otherwise.

@@ -226,8 +226,7 @@ impl SoakRun<'_> {
         let load = spec.load.then(|| self.context.load.join(" "));
         write_conditions(&folder, &spec, load.as_deref())?;
         let judged = judge::judge(&spec, &folder, &outcome, keeping.soak.settings.positions_judged);
-        let unread = keeping.merged.add_segment(&folder);
-        unread.iter().for_each(|line| eprintln!("soak: warning: {line}"));
+        keeping.merged.add_segment(&folder).iter().for_each(|line| eprintln!("soak: warning: {line}"));
         if keeping.soak.machine.is_null() {
             keeping.soak.machine = judged.machine;
         }

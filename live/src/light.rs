@@ -55,8 +55,7 @@ impl ClaimMonitor {
             (true, false) => Support::Doubtful,
             (true, true) => Support::Yes,
         };
-        let reasons = [interim.against, interim.missing].concat();
-        Judgement { supported, reasons }
+        Judgement { supported, reasons: [interim.against, interim.missing].concat() }
     }
 }
 

@@ -141,7 +141,10 @@ impl Server {
         if now_ms >= self.due.turn {
             self.due.turn = now_ms + TURN_MS;
             self.receive_input(now_ms);
-            self.repeat_stop(now_ms);
+            if self.stop_due_ms.is_some_and(|due_ms| now_ms >= due_ms) {
+                // As `rig.dbc` requires while the stop is held; this reaches a rig that starts later too.
+                let _ = self.send_stop(false, now_ms);
+            }
             self.send_due_events(now_ms);
         }
         self.clients.iter_mut().for_each(|client| client.write(now_ms));
@@ -407,13 +410,6 @@ impl Server {
                 message_response(Status::Good, "on the bus")
             }
             Err(error) => message_response(Status::Busy, &error.to_string()),
-        }
-    }
-
-    /// Sends the console's stop again, as `rig.dbc` requires while it is held; this reaches a rig that starts later too.
-    fn repeat_stop(&mut self, now_ms: u64) {
-        if self.stop_due_ms.is_some_and(|due_ms| now_ms >= due_ms) {
-            let _ = self.send_stop(false, now_ms);
         }
     }
 

@@ -188,8 +188,7 @@ impl Wire {
             HandSetPointAxis::Load => self.chain_values[1]?,
         };
         let position_m = position_m.unwrap_or(chain_values.position_set_point_m);
-        let force_n = force_n.unwrap_or(chain_values.force_set_point_n);
-        Some(HandSetPoint { axis, position_m, force_n })
+        Some(HandSetPoint { axis, position_m, force_n: force_n.unwrap_or(chain_values.force_set_point_n) })
     }
 
     pub(crate) fn note_stop(&mut self, stopper: usize, stop: EmergencyStop, now_ms: u64) {

@@ -41,8 +41,7 @@ fn shown() -> impl Iterator<Item = ComparedSignal> {
 fn difference(first: &Run, run: &Run, column: &str) -> Series {
     let of = |run: &Run| {
         let spans = run.record.experiments();
-        let series = run.record.measured.numbers(column).smoothed(MEAN_S);
-        series.within_all(&spans).shifted(-run.start_s())
+        run.record.measured.numbers(column).smoothed(MEAN_S).within_all(&spans).shifted(-run.start_s())
     };
     of(run).minus(&of(first))
 }

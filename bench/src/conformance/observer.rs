@@ -154,8 +154,7 @@ mod tests {
     use protocol::frames::{EmergencyStopReason, ValveCommand};
 
     fn command(alive: u8, echo: u16) -> CanFrame {
-        let command = ValveCommand { opening: 1.0, alive, echo, enable: true };
-        Frame::DriveValveCommand(command).encode().unwrap()
+        Frame::DriveValveCommand(ValveCommand { opening: 1.0, alive, echo, enable: true }).encode().unwrap()
     }
 
     /// What a controller is asked to have sent, after cycles up to 4999 of which 4990 was skipped.

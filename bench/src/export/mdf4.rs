@@ -58,7 +58,8 @@ fn records<W: mdf4_rs::writer::MdfWrite>(
     let mut row = Vec::with_capacity(message.spec.signals.len() + 1);
     for (stamp_ns, word) in &message.frames {
         row.clear();
-        row.push(DecodedValue::Float(seconds(*stamp_ns, origin_ns)));
+        // The difference is exact and rounded once.
+        row.push(DecodedValue::Float((i128::from(*stamp_ns) - i128::from(origin_ns)) as f64 / 1e9));
         row.extend(message.spec.signals.iter().map(|signal| match data_type(signal) {
             DataType::FloatLE => DecodedValue::Float(value(signal, *word)),
             DataType::SignedIntegerLE => DecodedValue::SignedInteger(signal.raw(*word)),
@@ -86,9 +87,4 @@ pub(super) fn comment(signal: &SignalSpec) -> String {
     } else {
         format!("{} {}", signal.comment, states.join(", "))
     }
-}
-
-/// Seconds from the origin to the stamp; the difference is exact and rounded once.
-fn seconds(stamp_ns: u64, origin_ns: u64) -> f64 {
-    (i128::from(stamp_ns) - i128::from(origin_ns)) as f64 / 1e9
 }

@@ -94,13 +94,15 @@ pub(super) fn write(
     let stamps = log.frames.iter().map(|logged| logged.record.stamp_ns);
     let start_ns = stamps.chain(log.cycle_zero_ns).min().unwrap_or_default();
     let unwritten = |error: io::Error| FileError::write(part, error);
-    let file = super::create(part).map_err(unwritten)?;
-    let mut trace = Trace { file, start_ns, is_first: true };
     let mut written = WriteCounts { frames: log.frames.len(), ..WriteCounts::default() };
     let zero_us = microseconds(i128::from(log.origin_ns()) - i128::from(start_ns));
     let about =
         json!({ "cycle_zero_us": log.cycle_zero_ns.map(|_| zero_us), "log": log.file.display().to_string() });
-    trace.begin(&about).and_then(|()| trace.frames(log)).map_err(unwritten)?;
+    let mut file = super::create(part).map_err(unwritten)?;
+    write!(file, "{{\"displayTimeUnit\":\"ns\",\"otherData\":{about},\"traceEvents\":[")
+        .map_err(unwritten)?;
+    let mut trace = Trace { file, start_ns, is_first: true };
+    trace.frames(log).map_err(unwritten)?;
     let rig = processes.iter().find(|process| process.pid == RIG);
     if let Some(first) = rig.and_then(|rig| rig.rows.first()) {
         let zero_ns = i128::from(first.due_ns) - i128::from(first.cycle) * i128::from(CYCLE_NS);
@@ -118,7 +120,7 @@ pub(super) fn write(
             written.faults += 1;
         }
     }
-    trace.end().map_err(unwritten)?;
+    trace.file.write_all(b"\n]}\n").and_then(|()| trace.file.flush()).map_err(unwritten)?;
     Ok(written)
 }
 
@@ -145,15 +147,6 @@ fn processes(folder: &Path) -> Result<Vec<ProcessCycles>, FileError> {
 }
 
 impl Trace {
-    fn begin(&mut self, about: &Value) -> io::Result<()> {
-        write!(self.file, "{{\"displayTimeUnit\":\"ns\",\"otherData\":{about},\"traceEvents\":[")
-    }
-
-    fn end(mut self) -> io::Result<()> {
-        self.file.write_all(b"\n]}\n")?;
-        self.file.flush()
-    }
-
     fn add(&mut self, event: &impl Serialize) -> io::Result<()> {
         self.file.write_all(if self.is_first { b"\n" } else { b",\n" })?;
         self.is_first = false;

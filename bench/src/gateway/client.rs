@@ -4,7 +4,7 @@
 //! counted. A reply that does not fit ends the connection: the client sends requests and does not read.
 
 use super::session::{Action, DisconnectReason, GREETING, Session};
-use live::client::is_not_ready;
+use live::client::{SEND_BUFFER, STALLED_MS, is_not_ready};
 use protocol::can::CanFrame;
 use rustix::net::sockopt;
 use serde::Serialize;
@@ -17,10 +17,6 @@ use std::time::Duration;
 pub(super) const LONGEST_FRAME: usize = 53;
 /// Room for replies beside the frames, bytes.
 const REPLIES: usize = 4096;
-/// Send buffer of a client's socket, bytes; the kernel doubles it.
-const SEND_BUFFER: usize = 64 << 10;
-/// Longest time with a queue of which the client reads nothing.
-const STALLED_MS: u64 = 30_000;
 /// Idle time before the first keep-alive probe, and time between probes.
 const KEEP_ALIVE: [Duration; 2] = [Duration::from_secs(30), Duration::from_secs(10)];
 /// Most bytes read from a client in one turn, so that a flood does not delay the others.
@@ -132,7 +128,10 @@ impl Client {
             self.report.frames_lost += 1;
             return;
         }
-        self.queue(text, now_ms);
+        if self.outgoing.is_empty() {
+            self.last_progress_ms = now_ms;
+        }
+        self.outgoing.extend(text.as_bytes());
         self.report.frames_to_client += 1;
     }
 
@@ -140,10 +139,9 @@ impl Client {
     pub(super) fn read(&mut self, bus: &str, now_ms: u64, mut send: impl FnMut(&CanFrame) -> bool) {
         let mut bytes = [0; READ_A_TURN];
         let read = match self.stream.read(&mut bytes) {
-            Ok(0) => return self.end(EndReason::ByClient),
-            Ok(read) => read,
+            Ok(read) if read > 0 => read,
             Err(error) if is_not_ready(&error) => return,
-            Err(_) => return self.end(EndReason::ByClient),
+            _ => return self.end(EndReason::ByClient),
         };
         let mut actions = Vec::new();
         self.session.take(&bytes[..read], bus, now_ms, &mut actions);
@@ -170,14 +168,13 @@ impl Client {
             }
             let front = self.outgoing.as_slices().0;
             match self.stream.write(&front[..front.len().min(ready)]) {
-                Ok(0) => return self.end(EndReason::ByClient),
-                Ok(written) => {
+                Ok(written) if written > 0 => {
                     self.outgoing.drain(..written);
                     self.at_once = self.at_once.saturating_sub(written);
                     self.last_progress_ms = now_ms;
                 }
                 Err(error) if is_not_ready(&error) => break,
-                Err(_) => return self.end(EndReason::ByClient),
+                _ => return self.end(EndReason::ByClient),
             }
         }
         if self.session.is_overdue(now_ms) {
@@ -202,12 +199,5 @@ impl Client {
         }
         self.outgoing.extend(text.as_bytes());
         self.at_once = self.outgoing.len();
-    }
-
-    fn queue(&mut self, text: &str, now_ms: u64) {
-        if self.outgoing.is_empty() {
-            self.last_progress_ms = now_ms;
-        }
-        self.outgoing.extend(text.as_bytes());
     }
 }

@@ -56,8 +56,7 @@ pub(super) fn judge(
         positions(&evidence, judge_positions),
     ]);
     let account = account.unwrap_or_default();
-    let machine = evidence.machine.clone();
-    SegmentVerdict { checks, figures: evidence.figures(), account, memory, machine }
+    SegmentVerdict { checks, figures: evidence.figures(), account, memory, machine: evidence.machine.clone() }
 }
 
 /// Passed when nothing is broken.

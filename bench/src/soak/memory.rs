@@ -96,8 +96,7 @@ impl Memory {
 
 /// Median of the slopes of all pairs.
 fn slope(points: &[(f64, f64)]) -> f64 {
-    let step = points.len().div_ceil(PAIRED_SAMPLES);
-    let points: Vec<_> = points.iter().step_by(step).collect();
+    let points: Vec<_> = points.iter().step_by(points.len().div_ceil(PAIRED_SAMPLES)).collect();
     let mut slopes = Vec::with_capacity(points.len() * points.len() / 2);
     for (place, (from, low)) in points.iter().enumerate() {
         slopes.extend(points[place + 1..].iter().map(|(to, high)| (high - low) / (to - from)));

@@ -138,8 +138,7 @@ impl SegmentLauncher<'_> {
     }
 
     fn start(&self, name: &str, path: &Path, arguments: &[OsString]) -> Result<RunningProgram, SoakError> {
-        let output = self.folder.join(format!("{name}.txt"));
-        RunningProgram::start(name, path, arguments, &output)
+        RunningProgram::start(name, path, arguments, &self.folder.join(format!("{name}.txt")))
             .map_err(|error| SoakError::Program { program: path.into(), reason: error.to_string() })
     }
 
