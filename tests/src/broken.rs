@@ -138,9 +138,8 @@ impl FaultRun {
     pub fn expect_marks_in_every_log(&self) {
         let rows = self.rows();
         assert!(!rows.is_empty(), "a script without a mark");
-        let events: Vec<_> = self.summary["events"].as_array().expect("events").iter().collect();
+        let events = self.summary["events"].as_array().expect("events").iter();
         let events: Vec<_> = events
-            .into_iter()
             .filter_map(|event| Some((event["cycle"].as_u64()? as usize, event["kind"].get("fault")?)))
             .map(|(cycle, mark)| {
                 let text = |key: &str| mark[key].as_str().unwrap_or_default().to_owned();
@@ -152,7 +151,8 @@ impl FaultRun {
             .map(|row| (row.cycle, row.number, row.what.clone(), row.fault.clone(), row.at.clone()))
             .collect();
         assert_eq!(events, reported, "summary.json and faults.csv");
-        let frames: Vec<_> = self
+        // Frames of one cycle keep their order; those that were lost on the way stand in the rig's own log all the same.
+        let mut sent: Vec<_> = self
             .log
             .iter()
             .filter_map(|frame| match Frame::decode(frame) {
@@ -165,8 +165,6 @@ impl FaultRun {
             .filter(|row| row.what == "begins" || row.what == "ends")
             .map(|row| (row.number, row.what == "begins"))
             .collect();
-        // Frames of one cycle keep their order; those that were lost on the way stand in the rig's own log all the same.
-        let mut sent = frames.clone();
         sent.sort_unstable();
         expected.sort_unstable();
         assert_eq!(sent, expected, "frames of the bench in bus.log");

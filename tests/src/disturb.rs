@@ -85,7 +85,7 @@ pub struct NamedCause {
 pub fn run(disturbance: Disturbance, after: Duration) -> NamedCause {
     let scene = Scene::new(RESTLESS);
     if disturbance == Disturbance::PageFaults {
-        own::page_faulting(&scene);
+        own::build_strictly(&scene, "tests/c/page_faults.c");
         scene.write("program.toml", own::PROGRAM);
     }
     let out = scene.path("run");

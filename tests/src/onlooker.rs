@@ -87,7 +87,7 @@ impl Viewer {
 
 /// `bench watch` at a free port of loopback.
 pub struct LivePage {
-    running: Running,
+    pub running: Running,
     pub address: SocketAddr,
     /// What it printed for those who may act; empty without `--control`.
     pub token: String,
@@ -125,10 +125,6 @@ impl LivePage {
         let (address, token) = address.split_once('/').expect("a path");
         let token = token.strip_prefix("#token=").unwrap_or_default().to_owned();
         Self { running, address: address.parse().expect("an address"), token }
-    }
-
-    pub fn running(&mut self) -> &mut Running {
-        &mut self.running
     }
 
     pub fn send(&self, request: &str) -> Answer {
@@ -198,8 +194,7 @@ impl Events {
         let mut current = String::new();
         loop {
             let mut line = String::new();
-            let read = self.lines.read_line(&mut line).expect("events");
-            assert!(read > 0, "the stream ended");
+            assert!(self.lines.read_line(&mut line).expect("events") > 0, "the stream ended");
             if let Some(event) = line.trim_end().strip_prefix("event: ") {
                 current = event.to_owned();
             } else if let Some(data) = line.trim_end().strip_prefix("data: ")

@@ -13,11 +13,6 @@ const STATES: [&str; 7] =
     ["initial-positioning", "preparing", "initial-force", "settling", "experiment", "final-settling", "done"];
 const STOPPED: Duration = Duration::from_millis(200);
 
-/// Emulator and controller under way; the experiment repeats until the emulator is interrupted.
-fn under_way(scene: &Scene) -> (Running, Running) {
-    scene.under_way(Pace::Real, UNDER_WAY)
-}
-
 /// Goes on for a while, ends the run as a person would, and hands back summary and measurement.
 fn end(scene: &Scene, emulator: Running) -> (Value, Table) {
     scene.wait_for_more_rows("emulator", 600);
@@ -33,7 +28,7 @@ fn end(scene: &Scene, emulator: Running) -> (Value, Table) {
 fn a_controller_that_is_killed_leaves_the_valve_shut_until_the_next_one_comes() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let (mut emulator, controller) = under_way(&scene);
+    let (mut emulator, controller) = scene.under_way(Pace::Real, UNDER_WAY);
     controller.kill();
     emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
     let second = scene.controller(Pace::Real).out(&scene.path("second")).with("--repeat").start();
@@ -88,7 +83,7 @@ fn a_controller_that_stands_still_has_its_valve_shut_and_its_losses_counted_at_b
     // Long enough for the second to overflow the queue of a usual kernel.
     for stopped in [STOPPED, 4 * STOPPED] {
         let scene = Scene::new(RESTLESS);
-        let (mut emulator, controller) = under_way(&scene);
+        let (mut emulator, controller) = scene.under_way(Pace::Real, UNDER_WAY);
         controller.signal(Signal::STOP);
         emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
         std::thread::sleep(stopped);
@@ -114,7 +109,7 @@ fn a_controller_that_stands_still_has_its_valve_shut_and_its_losses_counted_at_b
 fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost_frames() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
-    let (mut emulator, mut controller) = under_way(&scene);
+    let (mut emulator, mut controller) = scene.under_way(Pace::Real, UNDER_WAY);
     emulator.stop();
     // A loaded machine may have kept the sensors back before: what the controller says is no measure of the time.
     std::thread::sleep(STOPPED);

@@ -33,14 +33,6 @@ impl LossyRun {
         self.received.iter().filter(|frame| frame.standard_id() == Some(id)).count() as u64
     }
 
-    /// Nobody's queue was full, so that what one receiver missed all missed.
-    fn expect_no_full_queue(&self) {
-        for peer in self.host["peers"].as_array().expect("peers") {
-            let dropped = peer["dropped_at_queue"].as_object().expect("a table");
-            assert!(dropped.is_empty(), "a queue was full: {peer}");
-        }
-    }
-
     fn check_sensors(&self, axis: &str, id: u16, name: &str) {
         let sent = count(&self.summary, "/cycles") - count(&self.summary, "/skipped");
         let injected = self.injected(name);
@@ -93,7 +85,11 @@ impl LossyRun {
     }
 
     fn check(&self) {
-        self.expect_no_full_queue();
+        // Nobody's queue was full, so that what one receiver missed all missed.
+        for peer in self.host["peers"].as_array().expect("peers") {
+            let dropped = peer["dropped_at_queue"].as_object().expect("a table");
+            assert!(dropped.is_empty(), "a queue was full: {peer}");
+        }
         self.check_sensors("drive", 0x120, "120");
         self.check_sensors("load", 0x121, "121");
         self.check_commands("drive", 0x110, "110");
@@ -114,8 +110,7 @@ fn run_in_lockstep(wire: &str) -> (Scene, LossyRun) {
     // Good, unless the wire lost the rig's farewell.
     controller.wait();
     let summary = scene.summary();
-    let controller = scene.report();
-    let run = LossyRun { received, host: summary["bus_host"].clone(), summary, controller };
+    let run = LossyRun { received, host: summary["bus_host"].clone(), summary, controller: scene.report() };
     (scene, run)
 }
 
@@ -157,8 +152,7 @@ fn in_real_time_both_sums_agree_for_each_identifier() {
     let trace = std::thread::spawn(move || listener.frames_to_the_end());
     let controller = scene.controller(Pace::Real).with("--repeat").start();
     scene.wait_for_peers(2);
-    let emulator = scene.emulator(Pace::Real).with("--seconds 4").start();
-    both_good(emulator, controller);
+    both_good(scene.emulator(Pace::Real).with("--seconds 4").start(), controller);
     let host = host.interrupt();
     let host: Value = serde_json::from_str(&host.stdout).expect("the host reports as JSON");
     let (summary, controller) = (scene.summary(), scene.report());

@@ -22,7 +22,7 @@ fn run(scene: &Scene) -> CompletedProcess {
 #[test]
 fn the_example_in_c_drives_the_experiment() {
     let scene = scene();
-    own::shipped_example(&scene);
+    own::build_strictly(&scene, "controller/examples-c/position_pi.c");
     // A slow integral and a wide dead zone: with the defaults it hunts about the friction and never comes to rest.
     let tuned = "integral_time_s = 2.0\ndead_zone_m = 0.001\n";
     scene.write("program.toml", &format!("{}{tuned}", own::PROGRAM));
@@ -101,10 +101,8 @@ fn a_library_that_never_returns_ends_the_controller_with_what_was_recorded() {
     own::failing(&scene, "count > 200 && (pause(), 0)", &["-D_DEFAULT_SOURCE", "-include", "unistd.h"]);
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
-    let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
-    ended.expect_stderr(&["has not returned for 2 s"]);
-    let report = scene.report();
-    assert!(report["ended_because"].as_str().expect("a reason").contains("has not returned"));
+    scene.controller(Pace::Real).start().wait().expect_code(1).expect_stderr(&["has not returned for 2 s"]);
+    assert!(scene.report()["ended_because"].as_str().expect("a reason").contains("has not returned"));
     // All that was answered before is on disk.
     assert!(scene.axis_table("drive").cycles().len() > 150);
     drop(emulator);

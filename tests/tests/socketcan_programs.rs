@@ -32,8 +32,7 @@ fn python_can_sends_filters_repeats_and_listens() {
             other => panic!("no frame but {other:?}; {}", running.stderr()),
         }
     }
-    let ended = running.wait().expect_code(0);
-    ended.expect_stdout(&[
+    running.wait().expect_code(0).expect_stdout(&[
         "a limited task ends after 5",
         "a notifier hears all",
         "no CAN FD",
@@ -91,8 +90,7 @@ fn two_foreign_programs_meet_on_a_bus_without_a_rig() {
         start(&scene, "", &cangen).wait().expect_code(0);
     }
     listener.wait().expect_code(0);
-    let ended = pair.interrupt();
-    ended.expect_stderr(&["the bus carried", "0 did not fit"]);
+    pair.interrupt().expect_stderr(&["the bus carried", "0 did not fit"]);
 }
 
 #[test]
@@ -232,24 +230,18 @@ fn what_cannot_be_is_said_with_what_to_do() {
 /// As in a container: Docker's default profile refuses the second to whoever has no CAP_SYS_PTRACE.
 #[test]
 fn a_sandbox_that_forbids_it_is_told_with_what_to_allow() {
+    // Numbers of system calls on x86-64.
+    const SECCOMP: i32 = 317;
+    const PIDFD_GETFD: i32 = 438;
     let scene = Scene::new(SHORT);
     let forbid = built("forbid");
     let bench = executable(Program::Bench, Build::Shipped);
-    for (call, advice) in
-        [(call_numbers::SECCOMP, "seccomp=unconfined"), (call_numbers::PIDFD_GETFD, "--cap-add SYS_PTRACE")]
-    {
+    for (call, advice) in [(SECCOMP, "seccomp=unconfined"), (PIDFD_GETFD, "--cap-add SYS_PTRACE")] {
         let mut command = Command::new(&forbid);
         command.arg(call.to_string()).arg(&bench);
         command.args(["can", "--pair", "--bus", &scene.url(), "--", "true"]);
-        let refused = Running::start("bench can", &mut command).wait().expect_code(2);
-        refused.expect_stderr(&[advice]);
+        Running::start("bench can", &mut command).wait().expect_code(2).expect_stderr(&[advice]);
     }
-}
-
-/// Numbers of system calls on x86-64.
-mod call_numbers {
-    pub(super) const SECCOMP: i32 = 317;
-    pub(super) const PIDFD_GETFD: i32 = 438;
 }
 
 /// The runtime of Go makes its system calls by itself and waits in epoll; the program is linked statically, without a C library.
@@ -290,8 +282,7 @@ fn its_exit_code_is_the_programs_and_a_signal_goes_to_the_program() {
     running.wait_for("ready");
     running.signal(Signal::TERM);
     running.wait().expect_code(9).expect_stderr(&["asked"]);
-    let killed = shell(&scene, "--pair", "kill -KILL $$").wait();
-    killed.expect_code(128 + 9);
+    shell(&scene, "--pair", "kill -KILL $$").wait().expect_code(128 + 9);
 }
 
 #[test]

@@ -61,10 +61,6 @@ fn expect_all_the_same(experiment: &str) -> Scene {
     one
 }
 
-fn shipped(name: &str) -> String {
-    text(&workspace().join(format!("controller/experiments/{name}.toml")))
-}
-
 fn states(scene: &Scene, axis: &str) -> Vec<String> {
     let table = AxisTable::read(&scene.path("run").join(format!("controller-{axis}.csv")));
     table.states("main_chain").into_iter().map(str::to_owned).collect()
@@ -72,7 +68,7 @@ fn states(scene: &Scene, axis: &str) -> Vec<String> {
 
 #[test]
 fn the_linked_experiment_of_the_paper_is_the_same_in_one_process_in_two_and_rehearsed() {
-    let one = expect_all_the_same(&shipped("load-step"));
+    let one = expect_all_the_same(&text(&workspace().join("controller/experiments/load-step.toml")));
     let load = AxisTable::read(&one.path("run/controller-load.csv"));
     assert!(load.len() > 6000, "{} rows", load.len());
     let (force, opening) = (load.numbers("force_N"), load.numbers("opening"));
@@ -91,8 +87,7 @@ fn two_repetitions_are_the_same_in_one_process_in_two_and_rehearsed() {
         let seen = states(&one, axis);
         let experiments = seen.iter().filter(|state| *state == "experiment").count();
         assert_eq!(experiments, 2, "{axis}: {seen:?}");
-        let report = json(&one.path("run/controller.json"));
-        assert_eq!(report["axes"][axis]["repetitions_done"], 2, "{axis}");
+        assert_eq!(json(&one.path("run/controller.json"))["axes"][axis]["repetitions_done"], 2, "{axis}");
     }
 }
 

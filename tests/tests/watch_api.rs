@@ -307,7 +307,7 @@ fn orders_reach_rig_controllers_and_folder() {
 #[test]
 fn viewers_that_hang_or_talk_nonsense_cost_nobody_anything() {
     let _machine = turn::take();
-    let mut watched = WatchedRun::start(RESTLESS, "--clients 20");
+    let watched = WatchedRun::start(RESTLESS, "--clients 20");
     // One that asks for everything and reads nothing, one that never finishes its request, one that only connects.
     let host = watched.page.address;
     let mut hangs = watched.page.connect();
@@ -328,9 +328,8 @@ fn viewers_that_hang_or_talk_nonsense_cost_nobody_anything() {
     drop((crowd, silent, unfinished, hangs));
     // Asked by the one that stayed: a new one might still find no room.
     events.wait_for("state", |state| state["viewers"] == 1);
-    assert!(!watched.page.running().stderr().contains("panicked"));
-    let scene = watched.end();
-    assert_eq!(count(&scene.summary(), "/records_dropped"), 0);
+    assert!(!watched.page.running.stderr().contains("panicked"));
+    assert_eq!(count(&watched.end().summary(), "/records_dropped"), 0);
 }
 
 #[test]
@@ -351,8 +350,7 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     assert!(rows["t_s"][0].as_f64() < Some(5.0), "time begins anew: {rows}");
 
     let WatchedRun { scene, emulator, controller, page } = watched;
-    let mut page = page;
-    page.running().signal(Signal::KILL);
+    page.running.signal(Signal::KILL);
     scene.wait_for_more_rows("emulator", 500);
     emulator.interrupt();
     controller.wait();
