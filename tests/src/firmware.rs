@@ -115,8 +115,7 @@ pub fn positioned_where_it_ran(frames: &[CanFrame], repetitions: u64) -> Positio
     for (cycle, position_m) in trace.positions_m.range(began..began + experiment_cycles) {
         let (set_point_m, part, within) = set_point(cycle - began);
         let error_m = (set_point_m - position_m).abs();
-        let held_up = trace.held_up.range(cycle.saturating_sub(RECOVERY_CYCLES)..=*cycle);
-        if held_up.count() > 0 {
+        if trace.held_up.range(cycle.saturating_sub(RECOVERY_CYCLES)..=*cycle).count() > 0 {
             done.left_out += 1;
             continue;
         }

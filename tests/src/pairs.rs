@@ -34,8 +34,7 @@ pub fn in_turns<T>(
 
 /// Medians without and with, and of the difference with its interval.
 pub fn table<T>(runs: &[(T, T)], figures: &[Figure<T>]) -> Grid {
-    let head = ["in each run", "without", "with", "difference", "interval"];
-    let mut grid = Grid::new(head, []);
+    let mut grid = Grid::new(["in each run", "without", "with", "difference", "interval"], []);
     for (name, of) in figures {
         let middle =
             |values: Vec<f64>| median(values).map_or_else(String::new, |middle| number(middle.value));

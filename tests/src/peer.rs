@@ -36,8 +36,7 @@ impl Peer {
         loop {
             let socket =
                 socket_with(AddressFamily::UNIX, SocketType::SEQPACKET, flags, None).expect("a socket");
-            let address = SocketAddrUnix::new(path).expect("a path short enough");
-            match connect(&socket, &address) {
+            match connect(&socket, &SocketAddrUnix::new(path).expect("a path short enough")) {
                 Ok(()) => return Self { socket },
                 Err(error) => {
                     assert!(Instant::now() < until, "no host at {}: {error}", path.display());

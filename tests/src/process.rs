@@ -106,8 +106,7 @@ impl Running {
     pub fn wait_for_times(&mut self, text: &str, times: usize) {
         let until = Instant::now() + PATIENCE;
         while self.stderr().matches(text).count() < times {
-            let gone = self.child.try_wait().expect("a child can be waited for").is_some();
-            if gone {
+            if self.child.try_wait().expect("a child can be waited for").is_some() {
                 self.output.iter_mut().for_each(CapturedOutput::finish);
                 let output = self.stderr();
                 assert!(

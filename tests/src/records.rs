@@ -87,8 +87,7 @@ impl Table {
                 .filter(|numbers| numbers.len() == columns.len())
                 .unwrap_or_else(|| panic!("{}:{}: no row: {line:?}", path.display(), index + 1))
         };
-        let rows = lines.map(row).collect();
-        Self { columns, rows }
+        Self { rows: lines.map(row).collect(), columns }
     }
 
     pub fn column(&self, name: &str) -> Vec<f64> {

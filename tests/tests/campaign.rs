@@ -94,8 +94,7 @@ fn a_row_is_what_the_runs_folder_says_to_the_bit() {
             assert_eq!(row[name].parse::<f64>().ok(), summary[name].as_f64(), "run {run}: {name}");
         }
         assert!(compared >= 3, "{compared} figures prove nothing");
-        let setup = json(&place.path("again/run.json"));
-        assert_eq!(setup["seed"].to_string(), row["seed"], "run {run}");
+        assert_eq!(json(&place.path("again/run.json"))["seed"].to_string(), row["seed"], "run {run}");
     }
 }
 
@@ -285,8 +284,7 @@ fn the_page_is_whole_and_asks_for_nothing_from_elsewhere() {
 fn dask_gives_the_same_bytes_when_a_worker_is_killed() {
     let place = CampaignFolder::new(&SMALL.replace("draws = 3", "draws = 16"));
     let whole = undisturbed(&place);
-    let python = system_tests::foreign_python::of("dask");
-    let mut command = Command::new(python);
+    let mut command = Command::new(system_tests::foreign_python::of("dask"));
     command.arg(workspace().join("campaign/dask/hand_out.py")).current_dir(place.folder.path());
     command.args(["c.toml", "--out", "out", "--workers", "2"]);
     command.arg("--campaign").arg(executable(Program::Campaign, Build::Shipped));

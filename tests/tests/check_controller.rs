@@ -195,8 +195,7 @@ impl FaultyController {
             _ => 1,
         };
         self.alive = (self.alive + step) % 16;
-        let frame = Frame::DriveValveCommand(command).encode().unwrap();
-        let mut data = frame.data()[..4].to_vec();
+        let mut data = Frame::DriveValveCommand(command).encode().unwrap().data()[..4].to_vec();
         // Now and then, as real mistakes are; a check must not need more.
         if cycle % 97 == 96 {
             match self.fault {

@@ -230,8 +230,7 @@ fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
     let record = spoilt(folder.path(), |row, mut cells| {
         // 1 % of the rows here and there, 50 ms in one piece.
         let lost = row.wrapping_mul(2_654_435_761) % 100_000 < 1000 || (5000..5050).contains(&row);
-        let saturated = (6000..6400).contains(&row);
-        if saturated {
+        if (6000..6400).contains(&row) {
             cells[4] = "1000000";
         }
         (!lost).then(|| cells.join(","))
@@ -363,8 +362,7 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
         (&empty, &["empty.csv"]),
     ] {
         for step in ["close", "check", "calibrate", "locate", "name"] {
-            let ended = on(step, record, &path("out"), &[]).expect_code(BAD_INPUT);
-            ended.expect_stderr(words);
+            on(step, record, &path("out"), &[]).expect_code(BAD_INPUT).expect_stderr(words);
         }
     }
     on("close", &headless, &path("out"), &[]).expect_code(BAD_INPUT);
@@ -415,8 +413,7 @@ fn help_tells_every_step_every_option_and_the_exit_codes() {
         ("verify", &["--rig", "--extended", "--test"]),
         ("next", &["--rig", "--report", "--out"]),
     ] {
-        let help = discrepancy(&[&step, &"--help"]).expect_code(GOOD);
-        help.expect_stdout(parts);
+        discrepancy(&[&step, &"--help"]).expect_code(GOOD).expect_stdout(parts);
     }
     discrepancy(&[&"close"]).expect_code(BAD_INPUT).expect_stderr(&["--rig", "--train"]);
     assert!(RECORDS.folder.path().exists());

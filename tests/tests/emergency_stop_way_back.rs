@@ -189,8 +189,7 @@ fn with_restart_the_aborted_repetition_begins_anew_by_itself_without_a_jump() {
 
 #[test]
 fn on_start_the_aborted_repetition_waits_for_the_console_and_begins_anew_without_a_jump() {
-    let scene = back("on-start");
-    let drive = expect_smooth_restart(&scene, "on-start");
+    let drive = expect_smooth_restart(&back("on-start"), "on-start");
     let chain = ["ready", "tripped", "waiting-for-release", "recovering", "waiting-for-start", "ready"];
     assert_eq!(drive.states("emergency_stop_chain"), chain);
     let begins = drive.cycles()[drive.first("main_chain", "initial-positioning", TRIP)];

@@ -123,8 +123,7 @@ fn a_bus_that_stays_away_ends_both_with_complete_files() {
     emulator.wait().expect_code(3).expect_stderr(&["--bus-grace"]);
     controller.wait().expect_code(3).expect_stderr(&["--bus-grace"]);
     let summary = scene.summary();
-    let measurement = scene.measurement();
-    assert_eq!(count(&summary, "/cycles"), measurement.len() as u64);
+    assert_eq!(count(&summary, "/cycles"), scene.measurement().len() as u64);
     assert_eq!(count(&summary, "/bus/disconnects"), 1);
     assert!(count(&summary, "/bus/dropped_on_send") > 1000, "a second of frames was dropped, and counted");
     assert_eq!(summary["passed"], false);
@@ -181,10 +180,8 @@ fn a_bus_that_comes_back_in_time_is_found_by_both_and_the_gap_is_counted() {
     controller.wait().expect_code(0);
     drop(host);
     let summary = scene.summary();
-    let measurement = scene.measurement();
-    expect_valve_shut_between(&summary, &measurement, "command-stale", "command-fresh");
-    let report = scene.report();
-    for counted in [&summary, &report] {
+    expect_valve_shut_between(&summary, &scene.measurement(), "command-stale", "command-fresh");
+    for counted in [&summary, &scene.report()] {
         assert_eq!((count(counted, "/bus/disconnects"), count(counted, "/bus/reconnects")), (1, 1));
     }
     let reported = events::all(&summary);

@@ -193,8 +193,7 @@ fn a_babbling_node_raises_the_load_of_the_bus_and_takes_the_others_time() {
     let nodes = loud.summary["bus_host"]["wire_time"]["nodes"].as_array().expect("nodes").clone();
     assert!(nodes.iter().any(|node| node["name"] == "babbling node" && node["sent"] == 300), "{nodes:?}");
     // Over a wire that takes no time everybody hears it all the same.
-    let received = run_over("", &babble).received_of(16);
-    assert_eq!(received.iter().map(Vec::len).sum::<usize>(), 300);
+    assert_eq!(run_over("", &babble).received_of(16).iter().map(Vec::len).sum::<usize>(), 300);
     assert_eq!(count(&loud.summary, "/frames_ignored/unknown"), 300, "the rig hears it, and minds it not");
 }
 

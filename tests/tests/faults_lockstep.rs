@@ -5,8 +5,7 @@ use system_tests::exit::{BUS_FAILED, LOCKSTEP_TIMEOUT};
 use system_tests::{Pace, RESTLESS, SHORT, Scene, both_good, count, expect_whole_lines};
 
 fn expect_complete(scene: &Scene) {
-    let measurement = scene.measurement();
-    assert_eq!(count(&scene.summary(), "/cycles"), measurement.len() as u64);
+    assert_eq!(count(&scene.summary(), "/cycles"), scene.measurement().len() as u64);
 }
 
 #[test]

@@ -31,8 +31,7 @@ fn an_emulator_whose_file_cannot_grow_ends_the_run_and_keeps_whole_lines() {
         assert!(rows > 100, "what fitted was written: {rows} rows, {pace:?}");
         let _ = expect_whole_lines(&scene.path("emulator/truth.csv"));
         let _ = expect_whole_lines(&scene.path("emulator/bus.log"));
-        let summary = scene.summary();
-        assert_eq!(summary["passed"], false);
+        assert_eq!(scene.summary()["passed"], false);
     }
 }
 
@@ -45,8 +44,7 @@ fn a_controller_whose_file_cannot_grow_ends_and_the_rig_shuts_its_valve() {
     expect_told(controller.wait(), &scene.path("controller"));
     emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
     assert!(expect_whole_lines(&scene.path("controller/controller-drive.csv")) > 100);
-    let report = scene.report();
-    assert_eq!(report["ended_because"], "the output could not be written");
+    assert_eq!(scene.report()["ended_because"], "the output could not be written");
 }
 
 #[test]

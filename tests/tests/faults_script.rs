@@ -82,8 +82,7 @@ fn a_script_that_is_wrong_is_refused_with_line_key_value_and_range_before_anythi
         let scene = Scene::new(SHORT);
         let path = scene.write("faults.toml", &script);
         let emulator = scene.emulator(Pace::Real).with(&format!("--faults {}", path.display())).start();
-        let ended = emulator.wait().expect_code(2);
-        ended.expect_stderr(&[path.to_str().expect("UTF-8")]).expect_stderr(&hints);
+        emulator.wait().expect_code(2).expect_stderr(&[path.to_str().expect("UTF-8")]).expect_stderr(&hints);
         assert!(!scene.path("emulator").exists(), "no folder before the script is good");
     }
     let scene = Scene::new(SHORT);

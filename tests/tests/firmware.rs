@@ -27,8 +27,7 @@ fn run(scene: &Scene, out: &str, seconds: f64) -> PathBuf {
     let folder = scene.path(out);
     let emulator = scene.emulator(Pace::Lockstep).with(&options).out(&folder).start();
     let mut command = Command::new(BUILT.path().join("firmware-embedded"));
-    let firmware = Running::start("firmware", command.arg(scene.socket()));
-    both_good(emulator, firmware);
+    both_good(emulator, Running::start("firmware", command.arg(scene.socket())));
     folder
 }
 
@@ -49,8 +48,7 @@ fn it_positions_within_the_figures_and_in_lockstep_always_alike() {
 fn the_emergency_stop_shuts_its_valve_and_it_stays_shut() {
     let event = "event = [{ at_s = 4.0, do = \"emergency-stop\" }, { at_s = 5.0, do = \"release\" }]\n";
     let scene = Scene::new(&experiment(event));
-    let folder = run(&scene, "stopped", 6.5);
-    let logged = by_cycle(&bus_log(&folder.join("bus.log")));
+    let logged = by_cycle(&bus_log(&run(&scene, "stopped", 6.5).join("bus.log")));
     let command = |cycle: u64| {
         let frame = logged.iter().find_map(|logged| match logged.frame {
             Frame::DriveValveCommand(command) if logged.cycle == cycle => Some(command),

@@ -58,8 +58,7 @@ fn it_positions_within_the_bounds_and_twice_with_the_same_bytes() {
         let scene = scene("");
         let options = format!("--members 1 --join-timeout 300 --seconds {seconds}");
         let emulator = scene.emulator(Pace::Lockstep).with(&options).start();
-        let mcu = mcu(&scene);
-        both_good(emulator, mcu);
+        both_good(emulator, mcu(&scene));
         scene
     };
     let [one, other] = std::thread::scope(|threads| {

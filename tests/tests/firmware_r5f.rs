@@ -214,8 +214,7 @@ fn gdb_stops_it_while_the_rig_goes_on_and_a_fault_is_told() {
     debugger.env("PATH", tools_path()).args(["-nx", "-batch"]);
     debugger.args(commands.iter().flat_map(|command| ["-ex", command]));
     // When the program ends itself QEMU goes, which GDB takes for an error.
-    let session = Running::start("gdb", &mut debugger).wait();
-    session.expect_stdout(&[
+    Running::start("gdb", &mut debugger).wait().expect_stdout(&[
         "motion_step (control=",
         "firmware_receive",
         "$1 = APPROACH",

@@ -117,8 +117,7 @@ fn a_command_that_is_a_program_has_its_words_and_its_exit_codes() {
 #[test]
 fn an_installed_run_needs_its_prefix_alone_and_leaves_its_folder_where_it_was_started() {
     let prefix = Prefix::made();
-    let ended = prefix.run(&["run", "--lockstep"]).expect_code(0);
-    ended.expect_stdout(&[
+    prefix.run(&["run", "--lockstep"]).expect_code(0).expect_stdout(&[
         "running point-to-point on unix://",
         "passed                                        yes",
     ]);

@@ -59,8 +59,7 @@ fn python_can_records_a_run_to_the_frame_and_cantools_decodes_it() {
     logger.wait();
 
     let logged = frames(&log);
-    let report = gateway.close();
-    assert_eq!(count(&report, "/frames_lost"), 0);
+    assert_eq!(count(&gateway.close(), "/frames_lost"), 0);
     // Two frames of one moment from two senders may change places on their ways: each identifier is compared by itself, from
     // wherever in the run the logger came to wherever it went.
     let ids: BTreeSet<&str> = logged.iter().map(|frame| frame.split('#').next().unwrap()).collect();
@@ -112,8 +111,7 @@ fn python_can_sends_to_the_bus_and_to_the_other_clients() {
     // Not its own two: a sender does not hear itself.
     gateway.wait_for_times("is on the bus", 2);
     peer.send(&CanFrame::from_raw(0x8000_0456, &[7]).to_bytes());
-    let ended = sender.wait().expect_code(0);
-    assert_eq!(ended.stdout.trim(), "0x456 True 07");
+    assert_eq!(sender.wait().expect_code(0).stdout.trim(), "0x456 True 07");
     let report = gateway.close();
     assert_eq!((count(&report, "/frames_from_clients"), count(&report, "/frames_not_taken")), (2, 0));
 }

@@ -59,8 +59,7 @@ fn a_planned_change_acts_in_its_cycle_and_is_taken_back_for_the_next_repetition(
         expect_gain(&with, start + AT_MS..start + 400, 30.0);
     }
     expect_gain(&without, first..first + 400, 20.0);
-    let report = scene.report();
-    assert_eq!(report["axes"]["drive"]["variables"]["algorithm.gain_per_s"], 30.0, "at the end");
+    assert_eq!(scene.report()["axes"]["drive"]["variables"]["algorithm.gain_per_s"], 30.0, "at the end");
 }
 
 #[test]
@@ -86,8 +85,7 @@ fn edit(scene: &Scene, from: &str, to: &str) {
 }
 
 fn gain_of(scene: &Scene) -> f64 {
-    let report = scene.report();
-    report["axes"]["drive"]["variables"]["algorithm.gain_per_s"].as_f64().expect("a number")
+    scene.report()["axes"]["drive"]["variables"]["algorithm.gain_per_s"].as_f64().expect("a number")
 }
 
 fn under_way(options: &str) -> (Scene, Running, Running) {

@@ -96,8 +96,7 @@ fn without_a_grid_every_frame_is_in_the_csv_once() {
     for (identifier, signal) in
         [(" 120#", "DriveSensors.alive"), (" 130#", "Tick.cycle"), (" 110#", "DriveValveCommand.alive")]
     {
-        let rows = table[signal].iter().flatten().count();
-        assert_eq!(rows, log.matches(identifier).count(), "{signal}");
+        assert_eq!(table[signal].iter().flatten().count(), log.matches(identifier).count(), "{signal}");
     }
 }
 
@@ -273,8 +272,7 @@ fn an_mcap_takes_no_table_of_a_controller_of_an_earlier_run() {
     let _ = ["bus.log", "summary.json", "controller-drive.csv", "controller-load.csv"].map(copy);
     fs::write(folder.join("controller-drive.json"), "{}").expect("a report");
     let out = scene.path("copied.mcap");
-    let said = export(&folder, "mcap", &out, &[]).expect_code(0);
-    said.expect_stderr(&["controller-load.csv: left out"]);
+    export(&folder, "mcap", &out, &[]).expect_code(0).expect_stderr(&["controller-load.csv: left out"]);
     let channels = &mcap_channels(&out)["channels"];
     assert!(channels["/controller/drive"].is_object() && channels["/controller/load"].is_null());
 }
@@ -310,8 +308,7 @@ fn frames(log: &str) -> Vec<String> {
 #[test]
 fn python_can_reads_asc_and_blf_equal_to_the_log() {
     let scene = Scene::new(SHORT);
-    let foreign = scene.write("foreign.log", FOREIGN);
-    for log in [run_folder().join("bus.log"), foreign] {
+    for log in [run_folder().join("bus.log"), scene.write("foreign.log", FOREIGN)] {
         let expected = frames(&fs::read_to_string(&log).expect("the log"));
         for format in ["asc", "blf"] {
             let out = scene.path(&format!("log.{format}"));

@@ -87,8 +87,7 @@ fn a_live_rig_gets_no_stale_command_and_no_second_rig_beside_it() {
     let report = json(&scene.path("replayed/replay.json"));
     assert_eq!((count(&report, "/frames_sent"), count(&report, "/frames_left_out")), (1, 4));
     emulator.interrupt();
-    let summary = scene.summary();
-    assert_eq!(count(&summary, "/stale_commands"), 0);
+    assert_eq!(count(&scene.summary(), "/stale_commands"), 0);
     let log = fs::read_to_string(scene.path("emulator/bus.log")).expect("the rig's own log");
     assert!(log.contains(" 7F0#01") && !log.contains(" 110#"), "what was left out is not on the bus");
 }
@@ -120,8 +119,7 @@ fn received_some(peer: &Peer, count: usize) -> usize {
 #[test]
 fn an_interrupted_replay_keeps_what_was_done() {
     let (scene, _host, peer) = Scene::with_bus();
-    let log = scene.write("long.log", &commands(6000));
-    let replayed = replay(&scene, &log, "--spin-us 100");
+    let replayed = replay(&scene, &scene.write("long.log", &commands(6000)), "--spin-us 100");
     let before = received_some(&peer, 10);
     replayed.interrupt();
     let report = json(&scene.path("replayed/replay.json"));
@@ -145,6 +143,5 @@ fn nothing_is_sent_of_a_log_that_is_not_right_to_its_last_line() {
     }
     assert!(received(&peer, 0).is_empty());
     let log = scene.write("good.log", &commands(3));
-    let other = Scene::new(SHORT);
-    replay(&other, &log, "--wait-s 0").wait().expect_code(3).expect_stderr(&["needs a host"]);
+    replay(&Scene::new(SHORT), &log, "--wait-s 0").wait().expect_code(3).expect_stderr(&["needs a host"]);
 }

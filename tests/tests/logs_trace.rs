@@ -10,8 +10,7 @@ use system_tests::{CompletedProcess, Pace, Program, SHORT, Scene, json, run_both
 const FAULTS: &str = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\nfrom_s = 0.2\nto_s = 0.25\n";
 
 fn export(folder: &Path, out: &Path) -> CompletedProcess {
-    let bench = Program::Bench.start(&[&"export", &folder, &"--to", &"trace", &"--out", &out]);
-    bench.wait().expect_code(0)
+    Program::Bench.start(&[&"export", &folder, &"--to", &"trace", &"--out", &out]).wait().expect_code(0)
 }
 
 struct Trace {

@@ -107,8 +107,7 @@ fn one_good_command_from_elsewhere_does_change_the_run() {
 fn a_tick_from_elsewhere_is_counted_as_a_second_rig() {
     let scene = run(Some(&mut |peer, cycle| {
         if cycle == FIRST_CYCLE {
-            let tick = Frame::Tick(Tick { cycle, lockstep: true, ..Tick::default() });
-            peer.send_frame(&tick);
+            peer.send_frame(&Frame::Tick(Tick { cycle, lockstep: true, ..Tick::default() }));
         }
     }));
     let summary = scene.summary();

@@ -126,8 +126,7 @@ fn in_lockstep_every_shipped_experiment_keeps_the_plain_bound_and_what_it_assume
         let controller = scene.controller(Pace::Lockstep).experiment(&path).start();
         emulator.wait().expect_code(0);
         controller.wait();
-        let summary = scene.summary();
-        let widened = expect_below_the_bounds(wire_time(&summary));
+        let widened = expect_below_the_bounds(wire_time(&scene.summary()));
         assert!(widened.is_empty(), "{experiment}: not as declared: {widened:#?}");
         expect_arrivals_as_declared(&experiment, &scene.path("emulator/bus.log"));
     }
@@ -156,8 +155,7 @@ fn a_node_that_goes_off_the_bus_recovers_and_the_valve_is_shut_meanwhile() {
     let said = summary["events"].to_string();
     assert!(said.contains("command-stale") && said.contains("command-fresh"), "{said}");
     // Passive, off the bus and restarted: three error frames for its programs.
-    let controller = scene.report();
-    assert_eq!(count(&controller, "/bus/error_frames"), 3);
+    assert_eq!(count(&scene.report(), "/bus/error_frames"), 3);
 }
 
 #[test]

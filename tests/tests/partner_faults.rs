@@ -193,8 +193,7 @@ fn controllers_with_different_experiments_do_not_move_the_rig() {
     let drive = scene.axis_controller(Pace::Lockstep, "drive").start();
     let load = scene.axis_controller(Pace::Lockstep, "load").experiment(&other).start();
     for controller in [drive, load] {
-        let ended = controller.wait().expect_code(BOUND_BROKEN);
-        ended.expect_stderr(&["stopped before the end"]);
+        controller.wait().expect_code(BOUND_BROKEN).expect_stderr(&["stopped before the end"]);
     }
     emulator.wait();
     let said = ["drive", "load"].map(|axis| {

@@ -53,6 +53,5 @@ fn the_example_of_a_job_tests_can_software_at_a_rig_without_root_or_vcan() {
     assert!(workflow.contains("path: airbench\n") && workflow.contains("runs-on: ubuntu-24.04"));
     let mut job = Command::new(folder.join("job.sh"));
     job.arg(workspace()).env("PYTHON", of("hil")).env("AIRBENCH_BIN_DIR", shipped_programs());
-    let ended = Running::start("job.sh", &mut job).wait().expect_code(0);
-    ended.expect_stdout(&["2 passed"]);
+    Running::start("job.sh", &mut job).wait().expect_code(0).expect_stdout(&["2 passed"]);
 }

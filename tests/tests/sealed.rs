@@ -251,8 +251,7 @@ fn emulator_and_rehearsal_write_the_same_truth() {
     let scene = Scene::new(LIVELY);
     let rig = rig_with(&scene, &drawn(3, 12));
     let run = lockstep(&scene, &rig, "run", "");
-    let rehearsal = scene.rehearsal().rig(&rig).with("--seconds 1.3 --repeat").start();
-    rehearsal.wait().expect_code(0);
+    scene.rehearsal().rig(&rig).with("--seconds 1.3 --repeat").start().wait().expect_code(0);
     let (run, rehearsed) = (run.join("emulator"), scene.path("controller"));
     expect_same(&run, &rehearsed, &["measurement.csv", "truth.csv"], "differs");
 }

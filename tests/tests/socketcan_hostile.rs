@@ -40,8 +40,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     // A thousand sockets in a hundred processes.
     let crowd = start(&scene, "", &[&built("many-sockets"), &"vcan0", &"100", &"10"]);
     scene.wait_for_more_rows("emulator", GOES_ON);
-    let crowd = crowd.wait().expect_code(0);
-    crowd.expect_stdout(&["1000 sockets, each has received"]);
+    crowd.wait().expect_code(0).expect_stdout(&["1000 sockets, each has received"]);
 
     assert!(listener.stdout().lines().count() > 200);
     drop(listener);
@@ -60,8 +59,7 @@ fn a_flood_through_it_arrives_whole_and_in_order() {
     // Sender and receiver are programs of their own; the bus and its queues are between them.
     let mut pair = start(&scene, "--pair", &[&flow, &"receive", &"vcan0", &"20000"]);
     pair.wait_for("ready");
-    let sender = start(&scene, "", &[&flow, &"send", &"vcan0", &"20000", &"4000"]);
-    sender.wait().expect_code(0);
+    start(&scene, "", &[&flow, &"send", &"vcan0", &"20000", &"4000"]).wait().expect_code(0);
     let received = pair.wait().expect_code(0);
     received.expect_stdout(&["out of order 0"]);
     let told = |what: &str| -> u64 {

@@ -49,8 +49,7 @@ fn a_viewer_is_told_what_the_files_hold() {
     let socket = std::fs::metadata(scene.path("telemetry")).expect("a socket");
     assert_eq!(socket.permissions().mode() & 0o777, 0o600, "for this user alone");
     let reading = std::thread::spawn(|| viewer.to_the_end());
-    let controller = scene.controller(Pace::Real).with("--repeat").start();
-    both_good(emulator, controller);
+    both_good(emulator, scene.controller(Pace::Real).with("--repeat").start());
     let reported = reading.join().expect("the viewer does not panic");
 
     assert_eq!(reported.description["experiment"], value!({ "name": "experiment", "title": "restless" }));
@@ -132,8 +131,7 @@ fn a_viewer_that_stands_still_or_dies_costs_the_run_nothing() {
     assert!(cycles.len() > 2000, "more than a second of 1 kHz fits: {}", cycles.len());
     let summary = scene.summary();
     assert_eq!(summary["records_dropped"], 0);
-    let rows = scene.measurement().len();
-    assert_eq!(summary["cycles"], rows, "the files have every cycle");
+    assert_eq!(summary["cycles"], scene.measurement().len(), "the files have every cycle");
 }
 
 #[test]

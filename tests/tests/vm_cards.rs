@@ -268,8 +268,7 @@ fn sent_and_refused_by_cangen(run: &Path) -> (u64, u64) {
 fn both_interfaces_went_down_and_came_back(run: &Path) {
     let (summary, controller) = (json(&run.join("summary.json")), json(&run.join("controller.json")));
     for (file, report) in [("summary.json", &summary), ("controller.json", &controller)] {
-        let went_and_came = (count(report, "/bus/disconnects"), count(report, "/bus/reconnects"));
-        assert_eq!(went_and_came, (1, 1), "{file}");
+        assert_eq!((count(report, "/bus/disconnects"), count(report, "/bus/reconnects")), (1, 1), "{file}");
     }
 
     // can0, under the rig: the valves shut while the bus is gone, and follow again when it is back.

@@ -30,8 +30,7 @@ impl Rig {
         let telemetry = format!("--console --telemetry {}", scene.path("telemetry").display());
         let emulator = scene.emulator(Pace::Real).out(&scene.path(folder)).with(&telemetry).start();
         let out = scene.path(&format!("{folder}-controller"));
-        let controller = scene.controller(Pace::Real).out(&out).with("--repeat").start();
-        Self { emulator, controller }
+        Self { emulator, controller: scene.controller(Pace::Real).out(&out).with("--repeat").start() }
     }
 
     fn end(self) {

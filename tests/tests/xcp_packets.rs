@@ -90,8 +90,7 @@ fn bytes(scene: &Scene, file: &str) -> Vec<u8> {
 fn a_value_that_is_written_acts_from_the_next_cycle_on_and_the_session_is_the_same_every_time() {
     let logs = [&["both"][..], &["both"], &["drive", "load"]].map(|axes| {
         let scene = Scene::new(SHORT);
-        let options = format!("--xcp {}", config(&scene).display());
-        let answers = run(&scene, &options, axes, &write_gain);
+        let answers = run(&scene, &format!("--xcp {}", config(&scene).display()), axes, &write_gain);
         assert_eq!(answers.len(), 8, "{answers:02X?}");
         assert!(answers.iter().all(|answer| answer[0] == 0xFF), "{answers:02X?}");
         let drive = scene.axis_table("drive");
@@ -176,8 +175,7 @@ fn without_a_key_in_the_configuration_nothing_is_ever_unlocked() {
     let answers = run(&scene, "--xcp", &["both"], &write);
     let heads: Vec<_> = answers.iter().map(|answer| [answer[0], answer[1]]).collect();
     assert_eq!(heads[1..], [[0xFE, 0x24], [0xFE, 0x29], [0xFF, 0], [0xFE, 0x25]]);
-    let report = scene.report();
-    assert_eq!(report["axes"]["drive"]["variables"]["algorithm.gain_per_s"], 40.0);
+    assert_eq!(scene.report()["axes"]["drive"]["variables"]["algorithm.gain_per_s"], 40.0);
 }
 
 #[test]
@@ -218,8 +216,7 @@ fn a_parameter_set_is_printed_loaded_and_refused_with_its_line() {
     let options = format!("--parameters {}", set.display());
     scene.rehearsal().with(&options).start().wait().expect_code(0);
     let gain = |scene: &Scene| {
-        let report = scene.report();
-        report["axes"]["drive"]["variables"]["algorithm.gain_per_s"].as_f64().expect("a number")
+        scene.report()["axes"]["drive"]["variables"]["algorithm.gain_per_s"].as_f64().expect("a number")
     };
     assert_eq!(gain(&scene), 33.5);
     // What is set on the command line goes before it.
