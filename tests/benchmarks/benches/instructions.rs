@@ -20,12 +20,8 @@ mod scenario;
 
 use scenario::Kind;
 
-/// A plant in the middle of a linked motion, and the commands that follow.
-fn moving() -> (Plant, Vec<Inputs>) {
-    moving_with(|_| false)
-}
-
-/// The same with effects on at all their places, at the geometric middle of their drawn ranges.
+/// A plant in the middle of a linked motion, and the commands that follow; effects are on at all their places, at the geometric
+/// middle of their drawn ranges.
 fn moving_with(on: impl Fn(&Sheet) -> bool) -> (Plant, Vec<Inputs>) {
     let baseline = RigParameters::baseline();
     let kind = Kind { name: "linked under load steps", linked: true, ..Kind::FREE };
@@ -46,11 +42,6 @@ fn moving_with_one(name: &str) -> (Plant, Vec<Inputs>) {
     moving_with(|sheet| sheet.name == name)
 }
 
-/// Every fourth effect of the catalogue: some of each room.
-fn moving_with_ten() -> (Plant, Vec<Inputs>) {
-    moving_with(|sheet| SHEETS.iter().step_by(4).any(|fourth| fourth.name == sheet.name))
-}
-
 fn resting() -> (Plant, Vec<Inputs>) {
     let rig = RigParameters::baseline();
     let plant = Plant::new(&rig, &Setup { linked: true, ..Setup::default() }).expect("a good setup");
@@ -60,12 +51,13 @@ fn resting() -> (Plant, Vec<Inputs>) {
 type Case = (&'static str, fn() -> (Plant, Vec<Inputs>));
 
 const CASES: [Case; 7] = [
-    ("moving_linked", moving),
+    ("moving_linked", || moving_with(|_| false)),
     ("resting_linked", resting),
     ("inclination", || moving_with_one("inclination")),
     ("line_resistance", || moving_with_one("line-resistance")),
     ("presliding", || moving_with_one("presliding")),
-    ("ten_effects", moving_with_ten),
+    // Every fourth effect of the catalogue: some of each room.
+    ("ten_effects", || moving_with(|sheet| SHEETS.iter().step_by(4).any(|fourth| fourth.name == sheet.name))),
     ("all_effects", || moving_with(|_| true)),
 ];
 
