@@ -110,7 +110,9 @@ pub(crate) fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<Draw
     let rig = observer.rig();
     let mut others: Vec<(String, String, Vec<f64>)> = Vec::new();
     for sheet in SHEETS {
-        for place in sheet.place.places().iter().filter(|place| is_measured(**place, measured)) {
+        let is_measured =
+            |place: &&Place| axis_of(**place).map_or(measured == [true, true], |axis| measured[axis.index()]);
+        for place in sheet.place.places().iter().filter(is_measured) {
             let other = rig.with_effect(sheet.name, &place.to_string(), &nominal(sheet))?;
             others.push((sheet.name.to_owned(), place.to_string(), observer.signature(&other)));
         }
@@ -143,11 +145,6 @@ pub(crate) fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<Draw
         hidden_classes.push(HiddenClass { effect, place, strength, members, nearest: None });
     }
     Ok(DrawClasses { schema_version: SCHEMA_VERSION, number: draw.number, hidden: hidden_classes })
-}
-
-/// Whether an effect at this place shows in a record of these axes.
-fn is_measured(place: Place, measured: [bool; 2]) -> bool {
-    axis_of(place).map_or(measured == [true, true], |axis| measured[axis.index()])
 }
 
 /// The first key of a sheet at the middle of its drawn range.

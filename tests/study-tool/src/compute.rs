@@ -38,8 +38,7 @@ pub fn limits(seed: u64, say: &(dyn Fn(&str) + Sync)) -> Result<Limits, ComputeE
         let axis = measured.unwrap_or(Axis::Drive);
         let recipe = Recipe { seed, axis, both_axes: measured.is_none(), ..Recipe::default() };
         let record = simulate(&recipe, &rig).map_err(|error| ComputeError::Make { number: 0, error })?;
-        let observer = Observer::new(trajectory(&record, &rig));
-        limits.extend(limits_in(&observer, measured, say)?);
+        limits.extend(limits_in(&Observer::new(trajectory(&record, &rig)), measured, say)?);
     }
     Ok(Limits { schema_version: SCHEMA_VERSION, window_ms: WINDOW as u32, seed, limits })
 }

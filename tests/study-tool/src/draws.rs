@@ -218,16 +218,14 @@ impl Generator {
         let axis = axis_of(place).unwrap_or(Axis::Drive);
         let hidden = vec![self.hidden(sheet, place)];
         let form = if self.one_in(5.0) { Form::Near } else { Form::Catalogue };
-        let both_axes = needs_both_axes(sheet.place);
-        Recipe { hidden, form, both_axes, ..self.plain(axis) }
+        Recipe { hidden, form, both_axes: needs_both_axes(sheet.place), ..self.plain(axis) }
     }
 
     fn null(mut self) -> Recipe {
         let axis = self.axis();
         // Linked as often as the draws of effects are.
         let linked = SHEETS.iter().filter(|sheet| needs_both_axes(sheet.place)).count();
-        let both_axes = self.below(SHEETS.len()) < linked;
-        Recipe { both_axes, ..self.plain(axis) }
+        Recipe { both_axes: self.below(SHEETS.len()) < linked, ..self.plain(axis) }
     }
 
     fn parameter(mut self, name: &str) -> Recipe {
@@ -361,8 +359,7 @@ mod tests {
                 assert_eq!(own.numbers[0].is_sign_positive(), other.numbers[0].is_sign_positive());
                 assert_eq!(own.numbers[1..], other.numbers[1..]);
             }
-            let hidden = strong.recipe.hidden.clone();
-            assert_eq!(strong.recipe, Recipe { hidden, ..weak.recipe });
+            assert_eq!(strong.recipe, Recipe { hidden: strong.recipe.hidden.clone(), ..weak.recipe });
         }
         // What was begun before there were weaker ones is still read.
         assert!(!serde_json::to_string(&whole).unwrap().contains("weaker"));

@@ -63,8 +63,7 @@ pub(crate) fn amplitudes(sheet: &Sheet, place: Place) -> [Hidden; 3] {
     let [low, high] = sheet.keys[0].drawn;
     [low, middle([low, high]), high].map(|amplitude| {
         let shaping = sheet.keys.iter().skip(1).map(|key| key.default.unwrap_or_else(|| middle(key.drawn)));
-        let numbers = std::iter::once(amplitude).chain(shaping).collect();
-        Hidden { name: sheet.name, place, numbers }
+        Hidden { name: sheet.name, place, numbers: std::iter::once(amplitude).chain(shaping).collect() }
     })
 }
 

@@ -23,7 +23,7 @@
 use crate::draws::{axis_of, needs_both_axes};
 use crate::signature::{Observer, length};
 use plant::effects::SHEETS;
-use plant::effects::sheet::{EffectKey, Place, PlaceKind, Sheet};
+use plant::effects::sheet::{EffectKey, Place, Sheet};
 use plant::{Axis, ParameterError};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -140,8 +140,7 @@ pub struct Limits {
 impl Limits {
     /// Ratio of the excursion of an amplitude to that of its limit: 0 when no amplitude is detected, `None` when every one is.
     pub(crate) fn ratio(&self, sheet: &Sheet, place: Place, amplitude: f64) -> Option<f64> {
-        let key = &sheet.keys[0];
-        Scale::of(key).into_iter().find_map(|scale| {
+        Scale::of(&sheet.keys[0]).into_iter().find_map(|scale| {
             let own = scale.excursion(amplitude)?;
             let limit = self.limits.iter().find(|limit| {
                 limit.effect == sheet.name && limit.place == place.to_string() && limit.side == side(scale)
@@ -161,11 +160,6 @@ fn side(scale: Scale) -> Option<String> {
     }
 }
 
-/// The axis whose record the limit of an effect at a place is computed from; `None` for a record of both.
-fn measured_axis(kind: PlaceKind, place: Place) -> Option<Axis> {
-    axis_of(place).filter(|_| !needs_both_axes(kind))
-}
-
 /// The limits of all effects at all places that show in a record of one axis; in one of both where `measured` is `None`.
 ///
 /// # Errors
@@ -177,9 +171,8 @@ pub(crate) fn limits_in(
 ) -> Result<Vec<Limit>, ParameterError> {
     let mut cases = Vec::new();
     for sheet in SHEETS {
-        for place in
-            sheet.place.places().iter().filter(|place| measured_axis(sheet.place, **place) == measured)
-        {
+        let axis = |place: Place| axis_of(place).filter(|_| !needs_both_axes(sheet.place));
+        for place in sheet.place.places().iter().filter(|place| axis(**place) == measured) {
             cases.extend(Scale::of(&sheet.keys[0]).into_iter().map(|scale| (sheet, *place, scale)));
         }
     }

@@ -14,7 +14,7 @@
 use crate::classes::with_parameter;
 use crate::compute::{ComputeError, trajectory};
 use crate::draws::Draw;
-use crate::signature::{Observer, Run, length};
+use crate::signature::{Observer, Run, dot, length};
 use discrepancy::candidates::Candidate;
 use model_fit::estimator::{Estimator, Iterate, JOINT, Options, Step};
 use nalgebra::{DMatrix, DVector};
@@ -80,10 +80,9 @@ pub(crate) fn fitted(made: &Record, hidden: &Hidden) -> Result<NearestLaw, Compu
     let sheet = plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn");
     let candidate = Candidate::in_rig(&rig, sheet, hidden.place);
     let start = (0..sheet.keys.len()).map(|key| candidate.coordinate(key, hidden.numbers[key])).collect();
-    let whole = length(&observer.between(&observed, observer.baseline())).powi(2);
+    let whole = length(&observer.between(&observed, &observer.baseline)).powi(2);
     let fit = Fit { observer: &observer, observed: &observed, candidate, rig: &rig, priors: &[] };
-    let start = fit.at(start).expect("a record was made with these numbers");
-    let nearest = fit.nearest(start, whole);
+    let nearest = fit.nearest(fit.at(start).expect("a record was made with these numbers"), whole);
     let numbers = candidate.effect_parameters(&nearest.coordinates);
     Ok(NearestLaw { numbers, left_share: nearest.squares / whole.max(1e-12) })
 }
@@ -180,7 +179,6 @@ impl Fit<'_> {
                 Some(column)
             })
             .collect::<Option<_>>()?;
-        let dot = |left: &[f64], right: &[f64]| left.iter().zip(right).map(|(a, b)| a * b).sum::<f64>();
         let count = columns.len();
         let mut matrix = DMatrix::from_fn(count, count, |row, column| dot(&columns[row], &columns[column]));
         let largest = (0..count).map(|at| matrix[(at, at)]).fold(0.0, f64::max);

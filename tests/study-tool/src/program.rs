@@ -34,7 +34,7 @@ pub struct Program {
     pub(crate) path: PathBuf,
     pub(crate) arguments: Vec<String>,
     pub(crate) limit: Duration,
-    identity: Identity,
+    pub(crate) identity: Identity,
 }
 
 /// Identity of a program: results of different ones are never mixed.
@@ -97,10 +97,6 @@ impl Program {
         Ok(Program { path, arguments, limit, identity })
     }
 
-    pub(crate) fn identity(&self) -> &Identity {
-        &self.identity
-    }
-
     /// Runs the program once; its standard error goes to a file.
     ///
     /// # Errors
@@ -153,14 +149,13 @@ impl Program {
         kill();
         let _ = waiter.join();
         let memory_kib = used.map_or(0, |used| used.rusage.maxrss >> 10);
+        let ended_by_itself = |status: ExitStatus| {
+            status.code().map_or(ProgramEnd::Signalled(status.signal().unwrap_or(0)), ProgramEnd::Exited)
+        };
         let ended =
-            end.unwrap_or_else(|| Ok(used.map_or(ProgramEnd::NotStarted, |used| program_end(used.status))))?;
+            end.unwrap_or(Ok(used.map_or(ProgramEnd::NotStarted, |used| ended_by_itself(used.status))))?;
         Ok(taken(ended, memory_kib))
     }
-}
-
-fn program_end(status: ExitStatus) -> ProgramEnd {
-    status.code().map_or_else(|| ProgramEnd::Signalled(status.signal().unwrap_or(0)), ProgramEnd::Exited)
 }
 
 #[cfg(test)]
@@ -211,8 +206,7 @@ pub(crate) mod tests {
     #[test]
     fn another_executable_is_another_program() {
         let folder = tempfile::tempdir().unwrap();
-        let one = script(folder.path(), "exit 0", &[], PATIENCE).identity().clone();
-        let two = script(folder.path(), "exit 1", &[], PATIENCE).identity().clone();
-        assert_ne!(one, two);
+        let one = script(folder.path(), "exit 0", &[], PATIENCE).identity;
+        assert_ne!(one, script(folder.path(), "exit 1", &[], PATIENCE).identity);
     }
 }

@@ -138,12 +138,12 @@ pub fn run(step: &Step<'_>, program: &Program, draw: &Draw) -> Result<Option<Pro
         return Ok(Some(ProposalState::NotOpen));
     };
     let path = folder.join("result.json");
-    check_program(&path, &read_result(&path)?.program, program.identity(), SAME_PROGRAM)?;
+    check_program(&path, &read_result(&path)?.program, &program.identity, SAME_PROGRAM)?;
     let done = step.study.run(&label(step.label), draw.number);
     if done.exists() {
         let path = done.join("resolution.json");
         let resolution = read_resolution(&path)?;
-        check_program(&path, &resolution.program, program.identity(), SAME_PROGRAM)?;
+        check_program(&path, &resolution.program, &program.identity, SAME_PROGRAM)?;
         if !step.again {
             return Ok(Some(ProposalState::Measured(resolution)));
         }
@@ -176,7 +176,7 @@ fn resolve(
     let mut resolution = Resolution {
         schema_version: SCHEMA_VERSION,
         number,
-        program: program.identity().clone(),
+        program: program.identity.clone(),
         experiment,
         problem: None,
         taken: None,

@@ -50,7 +50,7 @@ const REST_M_PER_S: f64 = 1e-5;
 pub(crate) struct Observer {
     trajectory: TrueTrajectory,
     noise: [f64; CHANNELS],
-    baseline: Run,
+    pub(crate) baseline: Run,
     /// Subspace of the initial state for each window.
     windows: Vec<Window>,
 }
@@ -97,10 +97,6 @@ impl Observer {
 
     pub(crate) fn readings(&self, rig: &RigParameters) -> Run {
         self.run(rig).0
-    }
-
-    pub(crate) fn baseline(&self) -> &Run {
-        &self.baseline
     }
 
     /// The readings of the record of the trajectory, without noise.
@@ -228,8 +224,7 @@ impl Window {
     /// Projects the subspace of the initial state out of a difference of readings; those at `jumps` are set to 0.
     fn project(&self, difference: &mut [f64], jumps: &[bool]) {
         let all: Vec<bool> = self.jumps.iter().zip(jumps).map(|(left, right)| *left || *right).collect();
-        let zeroed = difference.iter_mut().zip(&all).filter(|(_, jumps)| **jumps);
-        zeroed.for_each(|(own, _)| *own = 0.0);
+        difference.iter_mut().zip(&all).filter(|(_, jumps)| **jumps).for_each(|(own, _)| *own = 0.0);
         let more;
         let basis = if all == self.jumps {
             &self.basis
@@ -347,8 +342,7 @@ mod tests {
 
     #[test]
     fn the_baseline_against_itself_is_nothing() {
-        let observer = Observer::new(trajectory());
-        assert_eq!(length(&observer.signature(&RigParameters::baseline())), 0.0);
+        assert_eq!(length(&Observer::new(trajectory()).signature(&RigParameters::baseline())), 0.0);
     }
 
     #[test]

@@ -113,9 +113,7 @@ impl<'a> Step<'a> {
             stop,
         }
     }
-}
 
-impl Step<'_> {
     /// Makes the records of a draw, unless they exist.
     ///
     /// # Errors
@@ -136,7 +134,11 @@ impl Step<'_> {
         let number = draw.number;
         let path = self.study.run(self.label, number);
         if path.exists() && !self.again {
-            return self.done(&path.join("result.json"), program).map(Some);
+            let path = path.join("result.json");
+            let result = read_result(&path)?;
+            // Results of another program under the same label are never mixed.
+            check_program(&path, &result.program, &self.identity(program), "give another --label")?;
+            return Ok(Some(result));
         }
         self.check_disk()?;
         self.records(draw)?;
@@ -149,14 +151,7 @@ impl Step<'_> {
     }
 
     fn identity(&self, program: &Program) -> Identity {
-        Identity { leave_out: self.without.is_some(), ..program.identity().clone() }
-    }
-
-    /// Results of another program under the same label are never mixed.
-    fn done(&self, path: &Path, program: &Program) -> Result<RunResult, StepError> {
-        let result = read_result(path)?;
-        check_program(path, &result.program, &self.identity(program), "give another --label")?;
-        Ok(result)
+        Identity { leave_out: self.without.is_some(), ..program.identity.clone() }
     }
 
     pub(crate) fn check_disk(&self) -> Result<(), StepError> {

@@ -54,13 +54,7 @@ impl Part {
     pub(crate) fn of(self, record: &Record, rig: &RigParameters) -> TrueTrajectory {
         let before = (self.from / WINDOW).min(SETTLING);
         let rows = record.rows[self.from - before * WINDOW..self.from + self.rows].to_vec();
-        let settling = before.max(1);
-        TrueTrajectory { settling, ..trajectory(&Record { rows, ..record.clone() }, rig) }
-    }
-
-    fn cut(self, record: &mut Record) {
-        record.rows.truncate(self.from + self.rows);
-        record.rows.drain(..self.from);
+        TrueTrajectory { settling: before.max(1), ..trajectory(&Record { rows, ..record.clone() }, rig) }
     }
 }
 
@@ -201,8 +195,9 @@ impl Twins {
         [measurement, truth]: [&Path; 2],
     ) -> Result<(), String> {
         let mut record = simulate(recipe, rig).map_err(|error| error.to_string())?;
-        if let (Experiment::Train, Some(twin)) = (recipe.experiment, self.of_draw(number)) {
-            twin.part.cut(&mut record);
+        if let (Experiment::Train, Some(Twin { part, .. })) = (recipe.experiment, self.of_draw(number)) {
+            record.rows.truncate(part.from + part.rows);
+            record.rows.drain(..part.from);
         }
         write(&record, measurement, truth).map_err(|error| error.to_string())
     }

@@ -118,9 +118,8 @@ impl Generator {
             let Some(smallest) = smallest(key, scale) else {
                 if at == 0 {
                     return None;
-                } else {
-                    continue;
-                };
+                }
+                continue;
             };
             if at == 0 || key.default != Some(*number) {
                 let value = scale.value(share * smallest).clamp(key.min.max(0.0), key.max);

@@ -273,10 +273,8 @@ fn nothing_hidden(cases: &[Case]) -> Vec<ConfusionRow> {
         row("nothing, parameters right", nulls(false)),
         row("nothing, parameters off by 1 to 3 %", nulls(true)),
     ];
-    let wrong = |case: &Case| {
-        let name = case.recipe["wrong_parameters"][0]["name"].as_str();
-        name.unwrap_or_default().to_owned()
-    };
+    let wrong =
+        |case: &Case| case.recipe["wrong_parameters"][0]["name"].as_str().unwrap_or_default().to_owned();
     rows.extend(
         crate::draws::SINGLE_PARAMETERS
             .iter()

@@ -76,8 +76,7 @@ fn truth_of(draw: &Draw) -> Value {
 pub(crate) fn scored(label: &str) -> Score {
     let folder = tempfile::tempdir().unwrap();
     study(folder.path(), label);
-    let score = score(&[folder.path().to_owned()], "truth", UNKNOWN).unwrap();
-    Score { label: label.to_owned(), ..score }
+    Score { label: label.to_owned(), ..score(&[folder.path().to_owned()], "truth", UNKNOWN).unwrap() }
 }
 
 /// The same, whose effects were left out of the catalogue: it tells what is expected, and names nothing.
@@ -85,8 +84,7 @@ pub(crate) fn scored_without(label: &str) -> Score {
     let folder = tempfile::tempdir().unwrap();
     let expectations = without(folder.path());
     let known = ScoreInputs { expectations: Some(&expectations), ..UNKNOWN };
-    let score = score(&[folder.path().to_owned()], "truth", known).unwrap();
-    Score { label: label.to_owned(), ..score }
+    Score { label: label.to_owned(), ..score(&[folder.path().to_owned()], "truth", known).unwrap() }
 }
 
 fn without(root: &Path) -> Expectations {
@@ -201,8 +199,7 @@ fn amplitudes_stand_in_the_bin_of_their_limit() {
     let over = |limit| {
         let limits = limits(limit);
         let known = ScoreInputs { limits: Some(&limits), ..UNKNOWN };
-        let score = score(&[folder.path().to_owned()], "truth", known).unwrap();
-        score.cases[draw.number].over_limit[0]
+        score(&[folder.path().to_owned()], "truth", known).unwrap().cases[draw.number].over_limit[0]
     };
     let ratio = over(Some(hidden.numbers[0].abs() / 5.0)).unwrap();
     assert!((ratio - 5.0).abs() < 1e-12, "{ratio}");

@@ -87,7 +87,7 @@ impl Screening {
             Some((candidate, response(&with)))
         };
         let others = candidates.into_iter().filter_map(of).collect();
-        let signature = observer.between(observer.baseline(), &without);
+        let signature = observer.between(&observer.baseline, &without);
         Some(Screening { rig, rows: observer.rows(), signature, parameters, others })
     }
 
@@ -178,16 +178,15 @@ impl Screening {
     pub(crate) fn fitted(&self, screened: &Screened, observer: &Observer) -> Option<Rival> {
         let candidate = screened.candidate;
         let priors = priors();
-        let fit = Fit { observer, observed: observer.baseline(), candidate, rig: &self.rig, priors: &priors };
+        let fit = Fit { observer, observed: &observer.baseline, candidate, rig: &self.rig, priors: &priors };
         let start = fit.at([&screened.start[..], &[0.0; PARAMETERS.len()]].concat())?;
         let nearest = fit.nearest(start, screened.distance.powi(2));
-        let keys = candidate.sheet.keys.len();
-        let (own, deviations) = nearest.coordinates.split_at(keys);
+        let (own, deviations) = nearest.coordinates.split_at(candidate.sheet.keys.len());
         if !is_drawn(&candidate, own[0]) {
             return None;
         }
         let rig = fit.rig_at(&nearest.coordinates)?;
-        let left = length(&observer.between(observer.baseline(), &nearest.run));
+        let left = length(&observer.between(&observer.baseline, &nearest.run));
         let off = PARAMETERS.iter().zip(deviations).map(|(name, off)| ((*name).to_owned(), 1.0 + off));
         let model = Model {
             effect: candidate.sheet.name.to_owned(),

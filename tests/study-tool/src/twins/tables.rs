@@ -208,8 +208,7 @@ fn case(
 
 /// Judges the report on the record of a twin.
 pub(super) fn first(draw: &Draw, taken: &Execution, report: &Result<Report, String>) -> FirstAnswer {
-    let hidden = &draw.recipe.hidden[0];
-    match (judge(hidden, taken, report), report) {
+    match (judge(&draw.recipe.hidden[0], taken, report), report) {
         (Outcome::Error, _) | (_, Err(_)) => FirstAnswer::Error,
         (_, Ok(report)) if ambiguous(draw, report).is_some() => FirstAnswer::Ambiguous,
         (Outcome::Resolved, _) => FirstAnswer::Right,
