@@ -66,12 +66,6 @@ pub struct Figures {
     pub settling_s: f64,
 }
 
-impl Figures {
-    pub fn is_still(&self) -> bool {
-        self.rest_peak_to_peak_m < STILL_M && self.ripple_m < RIPPLE_M
-    }
-}
-
 /// Tries `program`, which has seen nothing yet, on `moves`.
 ///
 /// # Errors
@@ -84,8 +78,7 @@ pub fn attempt(program: Program, moves: &[Move], trial: &Trial) -> Result<Figure
 pub fn positioning(program: impl Fn() -> Program) -> Result<Figures, TrialError> {
     let mut worst = Figures::default();
     for added_mass_kg in WEIGHTS_KG {
-        let trial = Trial { added_mass_kg, ..Trial::default() };
-        let figures = attempt(program(), POINT_TO_POINT, &trial)?;
+        let figures = attempt(program(), POINT_TO_POINT, &Trial { added_mass_kg, ..Trial::default() })?;
         worst.dynamic_m = worst.dynamic_m.max(figures.dynamic_m);
         worst.static_m = worst.static_m.max(figures.static_m);
         worst.rest_peak_to_peak_m = worst.rest_peak_to_peak_m.max(figures.rest_peak_to_peak_m);
@@ -192,6 +185,10 @@ const SLOW: usize = 300;
 const SETTLED_M: f64 = 2e-3;
 
 impl Figures {
+    pub fn is_still(&self) -> bool {
+        self.rest_peak_to_peak_m < STILL_M && self.ripple_m < RIPPLE_M
+    }
+
     fn take_move(&mut self, errors_m: &[f64]) {
         self.dynamic_m = errors_m.iter().fold(self.dynamic_m, |most, error| most.max(error.abs()));
         let (quick, slow) = (means(errors_m, SMOOTH), means(errors_m, SLOW));
@@ -235,8 +232,7 @@ mod tests {
     fn a_loop_that_oscillates_is_noticed() {
         let loud = || {
             let mut program = shipped("position-p");
-            let place = program.place("algorithm.gain_per_s").unwrap();
-            program.set(place, 80.0).unwrap();
+            program.set(program.place("algorithm.gain_per_s").unwrap(), 80.0).unwrap();
             program
         };
         let trial = Trial { added_mass_kg: 20.0, ..Trial::default() };

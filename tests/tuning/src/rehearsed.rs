@@ -72,8 +72,7 @@ pub fn rehearse(inputs: &Inputs, scene: &Scene, trial: &Trial) -> Result<Run, Tr
     while rehearsal.cycles() < LONGEST && !rehearsal.ended() {
         rows.push(rehearsal.step(|_, _| {}));
     }
-    let done = rehearsal.node().done();
-    Ok(Run { rows, done })
+    Ok(Run { rows, done: rehearsal.node().done() })
 }
 
 /// Largest of [`FACTORS`](super::FACTORS) up to which the rig does not oscillate; 0 if it does as it is.
