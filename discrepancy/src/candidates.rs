@@ -12,11 +12,10 @@
 //! The coordinates of an effect that the rig file already has count from the file's numbers.
 
 use crate::suspects::Suspect;
-use plant::Axis;
-use plant::RigParameters;
 use plant::effects::SHEETS;
 use plant::effects::sheet::{EffectKey, Part, Place, Sheet};
 use plant::parameters::ParameterError;
+use plant::{Axis, RigParameters};
 
 /// Ratio of the largest to the smallest drawn value above which a key is scaled logarithmically.
 const DECADES: f64 = 30.0;

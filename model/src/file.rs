@@ -1,11 +1,9 @@
 //! A model file as data: what its tables hold, in SI, with the places of its expressions.
 
-use crate::check;
-use crate::compile;
 use crate::inputs::Hold;
-use crate::read;
 use crate::rows::Rows;
 use crate::units::Unit;
+use crate::{check, compile, read};
 pub use expression::curve::Table;
 use expression::grammar::{NodeId, Nodes};
 use expression::mathml::Operand;

@@ -35,8 +35,7 @@ mod rows;
 mod simulate;
 
 pub use expression::compile::RESERVED;
-pub use expression::grammar::is_name_character;
-pub use expression::grammar::{DEEPEST, MOST_NODES};
+pub use expression::grammar::{DEEPEST, MOST_NODES, is_name_character};
 pub use expression::inputs::{Hold, Inputs};
 pub use expression::mathml::{Operand, bracketed as in_brackets, name as mathml_name};
 pub use expression::units::{Dimension, Unit, UnitError, with_powers};

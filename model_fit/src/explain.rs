@@ -1,10 +1,9 @@
 //! A model file in words: equations, numbers, units, suspects; with records also what these can tell apart.
 
-use super::bounds;
 use super::explain_page::page;
 use super::report::{friction, notes_of, numbers, place, significant, term};
 use super::structure::{Advice, Structure, structure};
-use super::{ModelError, look, read, read_with_notes, select};
+use super::{ModelError, bounds, look, read, read_with_notes, select};
 use model::{
     Hold, Input, Model, Parameter, Program, RecordLayout, Rows, Smoothing, Solver, Start, Suspect, Table,
 };

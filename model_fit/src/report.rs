@@ -1,16 +1,14 @@
 //! The report of a model file, in the model's own names and units.
 
 use super::adequacy::Residual;
-use super::bounds;
-use super::covariance;
 use super::discover::{DiscoveredTerm, Located};
 use super::fit::Fitting;
 use super::held_out::{Alternative, HeldOutResidual, Traces};
 use super::judge::{Evaluation, by_effect, is_one_effect};
-use super::look;
 use super::record::MeasuredRecord;
 use super::select::{AcceptedSuspect, Fitted, SearchResult};
 use super::structure::Structure;
+use super::{bounds, covariance, look};
 use crate::Verdict;
 use crate::estimator::Outcome;
 use crate::held_out::WORSE;

@@ -8,7 +8,6 @@
 //!
 //! Sources: Chen, Chen 2008, Biometrika 95(3) (penalty: extended BIC); Kass, Raftery 1995, JASA 90(430) (weights of models).
 
-use super::covariance;
 use super::fit::{Fitting, OPTIONS, OutputSeries, Point};
 use super::folds::{Folds, folds, refitted, steps};
 use super::judge::{Evaluation, ReferenceFits, SHARE_FLOOR, apart, is_one_effect, judge, most_share, weigh};
@@ -16,7 +15,7 @@ use super::normal::Normal;
 use super::pairs::{self, Pair};
 use super::progress::{ProgressCounter, with_progress};
 use super::record::MeasuredRecord;
-use super::starts;
+use super::{covariance, starts};
 use crate::estimator::Convergence;
 use model::{Failure, Model, Program};
 use nalgebra::DVector;

@@ -1,8 +1,7 @@
 //! Whether a report says that what is left is more than noise.
 
 use crate::closing::{close, file, random};
-use model_fit::ClosedModel;
-use model_fit::Verdict;
+use model_fit::{ClosedModel, Verdict};
 
 const LINE: &str = r#"
 [inputs.u]

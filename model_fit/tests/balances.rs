@@ -1,8 +1,7 @@
 //! Model files of one balance, which integrate nothing, on records that are made here.
 
 use crate::closing::{close_with, file, number, random};
-use model_fit::Verdict;
-use model_fit::{ClosedModel, ModelError, Search};
+use model_fit::{ClosedModel, ModelError, Search, Verdict};
 use std::fmt::Write as _;
 
 /// A path that repeats over 2000 samples: position a triangle, speed its sign; noise from a fixed sequence.

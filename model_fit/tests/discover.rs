@@ -6,8 +6,7 @@
 
 use crate::closing::{self, close_with, file, number, random};
 use crate::model_files::OSCILLATOR;
-use model_fit::Verdict;
-use model_fit::{ClosedModel, DiscoveredTerm, Search, read};
+use model_fit::{ClosedModel, DiscoveredTerm, Search, Verdict, read};
 
 /// The plant of the tests of model files, with one suspect that does not describe what is hidden here.
 fn oscillator() -> String {

@@ -1,8 +1,7 @@
 //! Model files closed on records that are simulated here, by another integrator, with a term hidden or none.
 
 use crate::closing::{close, file, number, random};
-use model_fit::Verdict;
-use model_fit::{ClosedModel, ModelReport, explain};
+use model_fit::{ClosedModel, ModelReport, Verdict, explain};
 use std::path::Path;
 
 /// A mass on a spring, pushed by a force; what may be missing, and a decoy.

@@ -5,8 +5,7 @@
 
 use crate::closing::{close_with, file, named, number};
 use crate::real::{crate_folder, data};
-use model_fit::Verdict;
-use model_fit::{ModelReport, ResidualComparison, Search};
+use model_fit::{ModelReport, ResidualComparison, Search, Verdict};
 use std::path::{Path, PathBuf};
 
 fn shipped(name: &str) -> String {

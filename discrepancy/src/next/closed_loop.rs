@@ -9,8 +9,7 @@
 use super::menu::{Entry, program};
 use crate::gridded_record::{AxisState, CHANNELS};
 use axis_control::axis::AxisRecord;
-use axis_control::setup::InputError;
-use axis_control::setup::{Inputs as Files, Mode};
+use axis_control::setup::{InputError, Inputs as Files, Mode};
 use plant::{Axis, Inputs, RigParameters, Scene, SceneError, SetupError, State, Truth};
 use protocol::frames::MainChainState;
 use rehearsal::{Rehearsal, RehearsalParts};

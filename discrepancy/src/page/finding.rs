@@ -1,7 +1,6 @@
 //! Findings in full: effects with numbers and alternatives, parameters, terms outside the catalogue, next experiment.
 
-use super::candidates;
-use super::words;
+use super::{candidates, words};
 use crate::outside::SHIFTS;
 use crate::report::{
     Curve, Dependence, LocatedTerm, LocatedVariable, NamedEffect, Quantity, Report, Surface,

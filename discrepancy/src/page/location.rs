@@ -5,8 +5,7 @@ use super::words;
 use crate::locate::regime::REGIMES;
 use crate::report::{Location, Report, UnknownInput};
 use pagekit::markup::{Cell, charts, folded, heading, paragraph, table, words as text_cell};
-use pagekit::plot::{Bar, Plot, Sample, bars, figure, range};
-use pagekit::plot::{COLUMNS, columns};
+use pagekit::plot::{Bar, COLUMNS, Plot, Sample, bars, columns, figure, range};
 
 /// Over this many times its noise a balance stands out to the eye.
 const CLEAR: f64 = 1.5;

@@ -3,12 +3,10 @@
 //! The difference is drawn in units of the sensor's noise, since a gap that nobody would see beside the whole stroke may be a
 //! hundred times the sensor noise. Before and after share their axes.
 
-use super::words;
-use super::{Pictures, Trace};
+use super::{Pictures, Trace, words};
 use crate::report::{Report, Verdict};
 use pagekit::markup::{charts, folded, paragraph};
-use pagekit::plot::{COLUMNS, columns};
-use pagekit::plot::{Plot, Sample, figure, range};
+use pagekit::plot::{COLUMNS, Plot, Sample, columns, figure, range};
 use std::ops::Range;
 
 /// Length of the stretch that is looked at closely, s.
