@@ -28,13 +28,15 @@ pub(super) fn candidates(report: &Report) -> String {
         &bars("ranking", "Candidates by score", &rows),
     );
     let row = |one: &Candidate| {
+        // What to doubt about the fit stands behind the decision that rests on it.
+        let doubt = one.fit.and_then(Convergence::doubt).map(|doubt| format!("; {doubt}"));
         vec![
             text_cell(&one.effect),
             text_cell(words::place(&one.effect, &one.place)),
             number(words::short(one.score)),
             number(one.share_explained.map_or_else(|| words::NOT_MEASURED.to_owned(), words::percent)),
             number(words::with_unit(&words::short(one.amplitude), &one.unit)),
-            Cell::Sentence(with_doubt(one)),
+            Cell::Sentence(one.decision.clone() + &doubt.unwrap_or_default()),
         ]
     };
     let heads =
@@ -42,12 +44,6 @@ pub(super) fn candidates(report: &Report) -> String {
     let count = report.candidates.len();
     let all = table("All candidates", &heads, report.candidates.iter().map(row));
     charts(&[drawn]) + &folded(&format!("All {count} candidates, and what became of each"), &all)
-}
-
-/// The decision, and what to doubt about the fit that it rests on.
-fn with_doubt(one: &Candidate) -> String {
-    let doubt = one.fit.and_then(Convergence::doubt);
-    doubt.map_or_else(|| one.decision.clone(), |doubt| format!("{}; {doubt}", one.decision))
 }
 
 pub(super) fn limits(report: &Report) -> String {

@@ -14,12 +14,11 @@ use plant::effects::sheet;
 pub(super) fn title(report: &Report) -> &'static str {
     match report.verdict {
         Verdict::NothingMissing if report.small.is_empty() => "Nothing above these limits",
-        Verdict::NothingMissing => "What was found",
+        Verdict::NothingMissing | Verdict::BadData => "What was found",
         Verdict::ParametersOnly => "What is off",
         Verdict::Named => "What is missing",
         Verdict::Ambiguous => "What it can be",
         Verdict::OutsideCatalogue => "What it looks like",
-        Verdict::BadData => "What was found",
     }
 }
 
@@ -41,16 +40,7 @@ pub(super) fn finding(report: &Report) -> String {
             "Too small to be named. They are part of the model, and the extended rig file has them: a real \
              machine differs from its rig file by many of these.",
         );
-        let row = |small: &NamedEffect| {
-            vec![
-                Cell::About(small.effect.clone(), law(report, small).unwrap_or_default()),
-                text_cell(words::place(&small.effect, &small.place)),
-                text_cell(words::numbers(small)),
-                number(words::percent(small.share_explained)),
-            ]
-        };
-        let heads = ["effect", "where", "numbers", "share of the log misfit"];
-        text += &table("Smaller effects", &heads, report.small.iter().map(row));
+        text += &effects_table(report, ("Smaller effects", "effect"), &report.small);
     }
     if !report.parameters.is_empty() {
         if !report.named.is_empty() {
@@ -120,23 +110,22 @@ fn effect(report: &Report, named: &NamedEffect) -> String {
     }
     if !named.alternatives.is_empty() {
         text += &paragraph("These records do not distinguish it from:");
-        let row = |other: &NamedEffect| {
-            let law = law(report, other).unwrap_or_default();
-            vec![
-                Cell::About(other.effect.clone(), law),
-                text_cell(words::place(&other.effect, &other.place)),
-                text_cell(words::numbers(other)),
-                number(words::percent(other.share_explained)),
-            ]
-        };
-        let rows = named.alternatives.iter().map(row);
-        text += &table(
-            "Alternatives",
-            &["it can be as well", "where", "numbers", "share of the log misfit"],
-            rows,
-        );
+        text += &effects_table(report, ("Alternatives", "it can be as well"), &named.alternatives);
     }
     text
+}
+
+/// Effects with their numbers, a row each; `head` stands above their names.
+fn effects_table(report: &Report, (label, head): (&str, &str), effects: &[NamedEffect]) -> String {
+    let row = |one: &NamedEffect| {
+        vec![
+            Cell::About(one.effect.clone(), law(report, one).unwrap_or_default()),
+            text_cell(words::place(&one.effect, &one.place)),
+            text_cell(words::numbers(one)),
+            number(words::percent(one.share_explained)),
+        ]
+    };
+    table(label, &[head, "where", "numbers", "share of the log misfit"], effects.iter().map(row))
 }
 
 fn numbers(named: &NamedEffect) -> String {

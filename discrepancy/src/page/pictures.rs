@@ -117,14 +117,13 @@ fn close(report: &Report, trace: &Trace, model: Model) -> String {
         &format!("{}, {unit}", words::signal(&trace.signal)),
     );
     let simulated = if model == Model::Before { &before } else { &after };
-    let (class, area) = line_classes(model);
+    let (class, area, name) = match model {
+        Model::Before if report.is_rig_file_enough() => ("line s1", "trace s1", "simulated"),
+        Model::Before => ("line s1", "trace s1", "simulated, the rig file as it was"),
+        Model::After => ("line s2", "trace s2", "simulated, with what was found"),
+    };
     plot.series("line s0", "trace s0", &columns(time_s, &measured, COLUMNS));
     plot.series(class, area, &columns(time_s, simulated, COLUMNS));
-    let name = match model {
-        Model::Before if report.is_rig_file_enough() => "simulated",
-        Model::Before => "simulated, the rig file as it was",
-        Model::After => "simulated, with what was found",
-    };
     let id = identifier(trace, model, "close");
     let title = format!("{}: measured and {name}", words::signal(&trace.signal));
     let range =
@@ -135,13 +134,6 @@ fn close(report: &Report, trace: &Trace, model: Model) -> String {
         &[(Sample::Line("line s0"), "measured"), (Sample::Line(class), name)],
         &plot.drawn(&id, &title, &range),
     )
-}
-
-fn line_classes(model: Model) -> (&'static str, &'static str) {
-    match model {
-        Model::Before => ("line s1", "trace s1"),
-        Model::After => ("line s2", "trace s2"),
-    }
 }
 
 /// Unit of a difference and its factor: the sensor's noise, or the signal's unit where the noise is unknown.
