@@ -33,10 +33,6 @@ fn scaling(
     number_of: impl Fn(&str) -> Option<f64>,
 ) -> Result<(Vec<&'static str>, Option<f64>), ExtendError> {
     let unknown = || ExtendError::UnknownParameter { name: quantity.name.clone(), known: names().join(", ") };
-    if !quantity.value.is_finite() {
-        let (what, value) = (quantity.name.clone(), quantity.value.to_string());
-        return Err(ExtendError::NotFinite { what, value });
-    }
     if quantity.unit.is_empty() {
         let mut keys = key_of_parameter(&quantity.name, Axis::Drive).ok_or_else(unknown)?;
         for key in key_of_parameter(&quantity.name, Axis::Load).ok_or_else(unknown)? {
@@ -47,18 +43,20 @@ fn scaling(
         return Ok((keys, Some(quantity.value)));
     }
     let keys = key_of_parameter(&quantity.name, mass_axis).ok_or_else(unknown)?;
-    let key = KEYS.iter().find(|key| key.path() == keys[0]).filter(|key| key.count == 1);
-    let wanted = key.map_or("", |key| key.unit.name());
-    if quantity.unit != wanted {
-        return Err(ExtendError::Unit {
-            name: quantity.name.clone(),
-            unit: quantity.unit.clone(),
-            wanted: wanted.to_owned(),
-        });
-    }
+    expect_unit(quantity, KEYS.iter().find(|key| key.path() == keys[0]).filter(|key| key.count == 1))?;
     // A number that was 0 has no factor; no key beside the first one needs it then.
     let factor = number_of(keys[0]).map(|old| quantity.value / old).filter(|factor| factor.is_finite());
     Ok((keys, factor))
+}
+
+/// Refuses a quantity that is not in the unit of its key.
+fn expect_unit(quantity: &Quantity, key: Option<&Key>) -> Result<(), ExtendError> {
+    let wanted = key.map_or("", |key| key.unit.name());
+    if quantity.unit == wanted {
+        return Ok(());
+    }
+    let (name, unit, wanted) = (quantity.name.clone(), quantity.unit.clone(), wanted.to_owned());
+    Err(ExtendError::Unit { name, unit, wanted })
 }
 
 /// `valve.kv_supply_m3_per_h[2]`, `cylinder.dead_volume_cm3`: key and place in its list; `None` for what is no number of a rig
@@ -87,16 +85,12 @@ pub(super) fn change(
         _ => None,
     };
     for quantity in changed {
+        if !quantity.value.is_finite() {
+            let (what, value) = (quantity.name.clone(), quantity.value.to_string());
+            return Err(ExtendError::NotFinite { what, value });
+        }
         if let Some((path, place)) = number_of_file(&quantity.name) {
-            if !quantity.value.is_finite() {
-                let (what, value) = (quantity.name.clone(), quantity.value.to_string());
-                return Err(ExtendError::NotFinite { what, value });
-            }
-            let wanted = KEYS.iter().find(|key| key.path() == path).map_or("", |key| key.unit.name());
-            if quantity.unit != wanted {
-                let (name, unit, wanted) = (quantity.name.clone(), quantity.unit.clone(), wanted.to_owned());
-                return Err(ExtendError::Unit { name, unit, wanted });
-            }
+            expect_unit(quantity, KEYS.iter().find(|key| key.path() == path))?;
             if done.contains(&path) || done.contains(&quantity.name.as_str()) {
                 return Err(ExtendError::Twice { what: quantity.name.clone() });
             }
