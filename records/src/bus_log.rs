@@ -152,13 +152,10 @@ fn rows(
     let mut newest = first;
     for (logged, cycle) in log.iter().zip(&cycles.of) {
         match (logged.frame, cycle) {
-            (Frame::DriveSensors(sensors), Some(cycle)) => {
+            (Frame::DriveSensors(sensors) | Frame::LoadSensors(sensors), Some(cycle)) => {
                 newest = newest.max(*cycle);
-                sent.entry(*cycle).or_default().add_sensors(file, 0, sensors, logged.line, *cycle)?;
-            }
-            (Frame::LoadSensors(sensors), Some(cycle)) => {
-                newest = newest.max(*cycle);
-                sent.entry(*cycle).or_default().add_sensors(file, 1, sensors, logged.line, *cycle)?;
+                let axis = usize::from(matches!(logged.frame, Frame::LoadSensors(_)));
+                sent.entry(*cycle).or_default().add_sensors(file, axis, sensors, logged.line, *cycle)?;
             }
             (Frame::RigStatus(status), _) => {
                 sent.entry(newest).or_default().supply_pressure_pa = Some(status.supply_pressure_pa);

@@ -96,11 +96,6 @@ impl Channel {
         self.to_string()
     }
 
-    /// The channel of a column in `measurement.csv`; `None` for time, and for what that file does not hold.
-    pub(crate) fn of_column(name: &str) -> Option<Channel> {
-        Self::of_mapping(name).filter(|channel| !channel.foreign_only())
-    }
-
     /// The channel that a mapping calls so.
     pub fn of_mapping(name: &str) -> Option<Channel> {
         Self::ALL.into_iter().find(|channel| channel.to_string() == name)

@@ -83,7 +83,7 @@ fn channels(
 ) -> Result<Vec<(Channel, usize)>, ReadError> {
     let mut places = Vec::new();
     for (place, column) in table.head.iter().enumerate() {
-        if let Some(channel) = Channel::of_column(column) {
+        if let Some(channel) = Channel::of_mapping(column).filter(|channel| !channel.foreign_only()) {
             record.add(channel);
             places.push((channel, place));
         } else if column != "time_s" {
