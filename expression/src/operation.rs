@@ -63,13 +63,8 @@ impl Code {
             | Code::Divide
             | Code::Power
             | Code::Min
-            | Code::Max
-            | Code::Less
-            | Code::LessOrEqual
-            | Code::Equal
-            | Code::NotEqual
-            | Code::And
-            | Code::Or => 2,
+            | Code::Max => 2,
+            code if code.is_condition() => 2,
             Code::Select => 3,
             _ => 1,
         }
@@ -77,17 +72,12 @@ impl Code {
 
     /// Whether its derivatives are 0 everywhere.
     pub(crate) fn is_flat(self) -> bool {
-        matches!(
-            self,
-            Code::Sign
-                | Code::Floor
-                | Code::Less
-                | Code::LessOrEqual
-                | Code::Equal
-                | Code::NotEqual
-                | Code::And
-                | Code::Or
-        )
+        matches!(self, Code::Sign | Code::Floor) || self.is_condition()
+    }
+
+    /// Whether it compares, or joins two conditions: its value is 0 or 1.
+    fn is_condition(self) -> bool {
+        matches!(self, Code::Less | Code::LessOrEqual | Code::Equal | Code::NotEqual | Code::And | Code::Or)
     }
 
     /// Result for these operands.

@@ -152,11 +152,6 @@ pub struct Parameter {
 }
 
 impl Parameter {
-    /// It is known, and one number for all records.
-    pub(crate) fn is_one_constant(&self) -> bool {
-        self.is_fixed && self.of_records_si.is_empty()
-    }
-
     /// The known value of a record, which may differ by record; `None` where the file lists records, and not this one. Of two
     /// ends of its path the longer is meant.
     #[must_use]

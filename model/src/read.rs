@@ -455,17 +455,8 @@ impl Reader<'_> {
             let noise_si = (noise > 0.0).then_some(noise * unit.factor);
             let model_error_si = one_or(&mut section, "model_error", 0.0, [0.0, 1e300])? * unit.factor;
             section.finish()?;
-            let suspect = None;
-            self.model.outputs.push(Output {
-                name,
-                column,
-                scale,
-                unit,
-                value,
-                suspect,
-                noise_si,
-                model_error_si,
-            });
+            let output = Output { name, column, scale, unit, value, suspect: None, noise_si, model_error_si };
+            self.model.outputs.push(output);
         }
         Ok(())
     }

@@ -46,7 +46,9 @@ impl Default for Rows {
 pub(crate) fn reads_inputs_alone(model: &Model, root: NodeId) -> Result<(), ExpressionError> {
     let is_known = |symbol| match symbol {
         Symbol::Time | Symbol::Pi | Symbol::Input(_) => true,
-        Symbol::Parameter(index) => model.parameters[index].is_one_constant(),
+        Symbol::Parameter(index) => {
+            model.parameters[index].is_fixed && model.parameters[index].of_records_si.is_empty()
+        }
         _ => false,
     };
     reads_alone((model, root, None), is_known, "rows and folds read inputs and fixed numbers alone")

@@ -139,11 +139,8 @@ impl Scene {
     /// How the rig is set up before the run.
     #[must_use]
     pub fn setup(&self) -> Setup {
-        Setup {
-            carriage_position_m: self.carriage_position_m,
-            linked: self.linked,
-            added_mass_kg: self.added_mass_kg,
-        }
+        let Scene { carriage_position_m, linked, added_mass_kg, .. } = *self;
+        Setup { carriage_position_m, linked, added_mass_kg }
     }
 }
 

@@ -174,14 +174,8 @@ impl Reader<'_> {
         for memory in &entry.memories {
             let update = self.of_library(&bound, &memory.update)?;
             let (name, unit) = (memory.name.clone(), bound.unit(&memory.quantity).0);
-            self.model.memories.push(Memory {
-                name,
-                unit,
-                start_si: 0.0,
-                start: None,
-                update,
-                suspect: Some(index),
-            });
+            let (start_si, start, suspect) = (0.0, None, Some(index));
+            self.model.memories.push(Memory { name, unit, start_si, start, update, suspect });
         }
         for friction in &entry.frictions {
             self.friction_of_library(&bound, friction)?;

@@ -166,19 +166,10 @@ fn is_name(section: &Section<'_>, name: &str) -> Result<()> {
     Err(section.wrong_at(name, &format!("{name}: a name has letters, digits and _ alone")))
 }
 
-/// The unit of a section, 1 when it is absent.
-pub(super) fn unit_of(section: &mut Section<'_>, source: &Source<'_>) -> Result<Unit> {
-    unit_at(section, source, "unit")
-}
-
-/// The same under another key.
-fn unit_at(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit> {
-    match section.text(key)? {
-        None => Ok(Unit::one()),
-        Some(text) => {
-            Unit::parse(&text.text).map_err(|wrong| source.wrong_from(text.at + wrong.at, &wrong.why))
-        }
-    }
+/// The unit under a key, 1 when it is absent.
+pub(super) fn unit_at(section: &mut Section<'_>, source: &Source<'_>, key: &str) -> Result<Unit> {
+    let Some(text) = section.text(key)? else { return Ok(Unit::one()) };
+    Unit::parse(&text.text).map_err(|wrong| source.wrong_from(text.at + wrong.at, &wrong.why))
 }
 
 struct Reader<'a> {
@@ -355,7 +346,7 @@ impl Reader<'_> {
 
     /// What the term keeps, its expressions as they are written.
     fn memory_variable(&self, name: String, mut section: Section<'_>) -> Result<MemoryText> {
-        let unit = self.unit(&mut section)?;
+        let unit = unit_at(&mut section, self.source, "unit")?;
         let range = match section.numbers("range")?.as_slice() {
             [least, most] if least < most && least.abs().max(most.abs()) <= 1e12 => [*least, *most],
             _ => {
@@ -370,12 +361,8 @@ impl Reader<'_> {
         Ok(MemoryText { name, unit, range, start, update })
     }
 
-    fn unit(&self, section: &mut Section<'_>) -> Result<Unit> {
-        unit_of(section, self.source)
-    }
-
     fn number(&self, name: String, mut section: Section<'_>) -> Result<Number> {
-        let unit = self.unit(&mut section)?;
+        let unit = unit_at(&mut section, self.source, "unit")?;
         let value = match section.numbers("value")?.as_slice() {
             [one] => *one,
             [] if self.is_suspect => 0.0,

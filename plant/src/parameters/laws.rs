@@ -10,7 +10,7 @@
 //! the expression; one that is called as a variable of the rig has the suspect's name before its own. Who reads the file has the
 //! laws.
 
-use super::declared::unit_of;
+use super::declared::unit_at;
 use crate::effects::declared::{Number, VARIABLES};
 use expression::grammar::renamed;
 use expression::units::Unit;
@@ -185,7 +185,7 @@ fn read_number(
     let usual = Unit::parse(&number.unit).unwrap_or_else(|_| Unit::one());
     let (mut unit, mut values, mut ends, mut priors) = (usual.clone(), Vec::new(), Vec::new(), Vec::new());
     if let Some((table, source)) = table {
-        let read = unit_of(table, source)?;
+        let read = unit_at(table, source, "unit")?;
         if table.has("unit") {
             unit = read;
         }
