@@ -269,6 +269,7 @@ fn quoted(text: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Search;
     use model::Model;
 
     fn of(text: &str) -> Result<(String, Model), String> {
@@ -355,11 +356,8 @@ mod tests {
         // A column in seconds is taken before it.
         let body = rows(|t| format!("{};{t};{}\n", second(t), (0.2 * t).cos()));
         let (written, model) = of(&format!("\u{feff}# logger\nat;time_s;y\n{body}")).unwrap();
-        assert_eq!(
-            (model.record.time_column.as_str(), model.record.is_calendar),
-            ("time_s", false),
-            "{written}"
-        );
+        let record = &model.record;
+        assert_eq!((record.time_column.as_str(), record.is_calendar), ("time_s", false), "{written}");
         assert!(written.contains("Column at is left out: it holds no numbers"), "{written}");
         for (from, to, message) in [
             (
@@ -409,11 +407,8 @@ mod tests {
         let none = new(&[], &["u_V"]).unwrap();
         assert!(!none.has_input && none.text.contains("No column was taken as an input"), "{}", none.text);
         let refused = new(&["p_bar"], &[]).unwrap_err();
-        assert!(
-            refused
-                .ends_with("p_bar is no column with numbers beside the time; there are x_mm, p_bar_g, u_V"),
-            "{refused}"
-        );
+        let said = "p_bar is no column with numbers beside the time; there are x_mm, p_bar_g, u_V";
+        assert!(refused.ends_with(said), "{refused}");
     }
 
     #[test]
@@ -442,7 +437,7 @@ mod tests {
         }
         std::fs::write(&record, text).unwrap();
         std::fs::write(&file, new_model(&record, Roles::default()).unwrap().text).unwrap();
-        let closed = crate::close(&file, &[record], &[], &mut |_| {}).unwrap();
+        let closed = crate::close_with(&file, (&[record], &[]), Search::MoreThanNoise, &mut |_| {}).unwrap();
         let value = |name: &str| closed.report.parameters.iter().find(|one| one.name == name).unwrap().value;
         assert!((value("lag_y") - 0.5).abs() < 0.01, "{}", value("lag_y"));
         assert!((value("gain_y_heater") - 2.5).abs() < 0.02, "{}", value("gain_y_heater"));

@@ -89,13 +89,8 @@ pub(crate) fn judge(
                 ]
             },
         );
-        let outputs = outputs.collect();
-        traces.push(Traces {
-            record: record.name.clone(),
-            time_s: record.time_s.clone(),
-            outputs,
-            first_row,
-        });
+        let (outputs, record, time_s) = (outputs.collect(), record.name.clone(), record.time_s.clone());
+        traces.push(Traces { record, time_s, outputs, first_row });
     }
     Ok((judged, traces))
 }
@@ -156,10 +151,8 @@ fn residuals(fitted: &Fitted<'_>, record: &[MeasuredRecord]) -> Result<(OutputSe
 
 /// What both models say of the training records.
 pub(crate) fn trained(found: &SearchResult<'_>) -> Result<Vec<Traces>, Failure> {
-    let all =
-        [&found.baseline, &found.extended].map(|fitted| fitted.fitting.residuals(&fitted.point.values_si));
-    let [before, after] = all;
-    let (before, after) = (before?, after?);
+    let left_by = |fitted: &Fitted<'_>| fitted.fitting.residuals(&fitted.point.values_si);
+    let (before, after) = (left_by(&found.baseline)?, left_by(&found.extended)?);
     let records = found.baseline.fitting.records.iter().zip(before.into_iter().zip(after));
     let traces = records.map(|(record, (before, after))| {
         let outputs = before.into_iter().zip(after).map(|([residual, predicted], [_, extended])| {
@@ -167,12 +160,8 @@ pub(crate) fn trained(found: &SearchResult<'_>) -> Result<Vec<Traces>, Failure> 
                 residual.iter().zip(&predicted).map(|(left, predicted)| left + predicted).collect();
             [measured, predicted, extended]
         });
-        Traces {
-            record: record.name.clone(),
-            time_s: record.time_s.clone(),
-            outputs: outputs.collect(),
-            first_row: 0,
-        }
+        let (outputs, record, time_s) = (outputs.collect(), record.name.clone(), record.time_s.clone());
+        Traces { record, time_s, outputs, first_row: 0 }
     });
     Ok(traces.collect())
 }

@@ -171,24 +171,11 @@ pub enum Search {
 /// simulations, some minutes.
 const MOST_STEPS_UNASKED: usize = 100_000;
 
-/// Closes a model: names what it lacks by the training records, and compares both models on the held-out ones. Where no suspect
-/// is named and more than noise is left, a formula is searched.
+/// Closes a model: names what it lacks by the training records, and compares both models on the held-out ones. A formula is
+/// searched where `search` says.
 ///
 /// # Errors
 /// [`ModelError`] for a model or a record that cannot be used.
-pub fn close(
-    file: &Path,
-    train: &[PathBuf],
-    tests: &[PathBuf],
-    progress: &mut dyn FnMut(&str),
-) -> Result<ClosedModel, ModelError> {
-    close_with(file, (train, tests), Search::MoreThanNoise, progress)
-}
-
-/// The same, and says where a formula is searched.
-///
-/// # Errors
-/// As [`close`].
 pub fn close_with(
     file: &Path,
     (train, tests): (&[PathBuf], &[PathBuf]),
@@ -276,7 +263,7 @@ pub struct RecordPreview {
     pub notes: Vec<String>,
 }
 
-/// Reads and checks records as [`close`] does, and fits nothing.
+/// Reads and checks records as [`close_with`] does, and fits nothing.
 ///
 /// # Errors
 /// [`ModelError`] for a model or a record that cannot be used.

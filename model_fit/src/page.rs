@@ -37,13 +37,15 @@ pub(crate) fn page(
         true => String::new(),
         false => pagekit::markup::list(notes, ""),
     };
+    let searched =
+        if report.taken_back { "What a search found, and is taken back" } else { "What a search found" };
     let sections = [
         ("notes", "Notes", notes),
         ("records", "Measured, and both models", pictures(model, report, traces)),
         ("named", named_title(report), named(report)),
         ("term-curves", "What it looks like", term_curves(curves)),
         ("located", "Where it comes from", located(report)),
-        ("discovered", discovered_title(report), discovered(report)),
+        ("discovered", searched, discovered(report)),
         (
             "held-out",
             "On held-out records",
@@ -232,10 +234,6 @@ fn discovered(report: &ModelReport) -> String {
     let heads =
         ["term", "how it stands there", "reads", "of what is left, on folds", "best in halves", "as good"];
     table("Terms that no suspect describes", &heads, rows)
-}
-
-fn discovered_title(report: &ModelReport) -> &'static str {
-    if report.taken_back { "What a search found, and is taken back" } else { "What a search found" }
 }
 
 fn located(report: &ModelReport) -> String {

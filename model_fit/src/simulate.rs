@@ -43,12 +43,11 @@ pub fn simulate(file: &Path, record: &Path) -> Result<SimulatedRecord, ModelErro
     let fitting = Fitting::new(&model, program, &records, &[]);
     let predicted = fitting.residuals(&fitting.start())?.pop().expect("one record");
     let record = &records[0];
-    let outputs = model.outputs.iter().zip(&predicted).map(|(output, [left, _])| {
+    let outputs = model.outputs.iter().zip(&predicted).zip(&record.outputs);
+    let outputs = outputs.map(|((output, [left, _]), measured)| {
         let left: Vec<f64> = left.iter().copied().filter(|left| !left.is_nan()).collect();
         let squares: f64 = left.iter().map(|left| left * left).sum();
-        let place =
-            model.outputs.iter().position(|other| other.name == output.name).expect("it is one of them");
-        let measured: Vec<f64> = record.outputs[place].iter().flatten().copied().collect();
+        let measured: Vec<f64> = measured.iter().flatten().copied().collect();
         SimulatedOutput {
             output: output.name.clone(),
             unit: output.unit.text.clone(),

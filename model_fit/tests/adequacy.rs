@@ -34,7 +34,7 @@ fn closed(model: &str, more: impl Fn(f64) -> f64) -> ClosedModel {
     let folder = tempfile::tempdir().unwrap();
     let [model, record] =
         [("model.toml", model), ("record.csv", &text)].map(|(name, text)| file(folder.path(), name, text));
-    close(&model, &[record], &[], &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    close(&model, &[record], &[]).unwrap_or_else(|error| panic!("{error}"))
 }
 
 fn slow(t: f64) -> f64 {
@@ -46,11 +46,8 @@ fn a_residual_that_is_no_noise_and_no_suspect_is_not_called_nothing_missing() {
     let found = closed(&format!("{LINE}{OFFSET}"), slow);
     let report = &found.report;
     assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{}", report.headline);
-    assert!(
-        report.headline.starts_with("None of the suspects explains what is left: y 0.3"),
-        "{}",
-        report.headline
-    );
+    let headline = &report.headline;
+    assert!(headline.starts_with("None of the suspects explains what is left: y 0.3"), "{headline}");
     let left = &report.residuals[0];
     // The sine has an rms of 0.35, and moves by 0.025 rms from row to row.
     assert!((left.rms - 0.37).abs() < 0.03 && (left.noise - 0.1).abs() < 0.02, "{left:?}");
@@ -85,9 +82,6 @@ fn a_declared_error_or_noise_is_allowed_for_and_no_more() {
 fn more_beside_what_is_named_is_said_in_the_headline() {
     let report = closed(&format!("{LINE}{OFFSET}"), |t| 1.0 + slow(t)).report;
     assert_eq!((report.verdict, report.adequate), (Verdict::Named, false), "{report:#?}");
-    assert!(
-        report.headline.starts_with("offset is missing; more is missing beside: y"),
-        "{}",
-        report.headline
-    );
+    let headline = &report.headline;
+    assert!(headline.starts_with("offset is missing; more is missing beside: y"), "{headline}");
 }

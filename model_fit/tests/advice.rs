@@ -77,7 +77,7 @@ fn with_gain(model: &str) -> String {
 fn a_sensor_is_advised_that_two_suspects_do_not_move_alike() {
     let folder = tempfile::tempdir().unwrap();
     let [file, record] = files(folder.path(), TANKS);
-    let report = close(&file, &[record], &[], &mut |_| {}).unwrap();
+    let report = close(&file, &[record], &[]).unwrap();
     let structure = &report.report.structure;
     assert_eq!(structure.twins.len(), 1, "{structure:?}");
     assert_eq!(structure.advice.len(), 1, "{structure:?}");
@@ -136,7 +136,7 @@ fn a_suspect_whose_number_starts_at_0_is_seen_by_what_it_does_beside_it() {
                 parameters.k = { value = 0, range = [-1, 1] }\n";
     let zero = TANKS.replace("value = 0.1", "value = 0") + idle;
     let [file, record] = files(folder.path(), &zero);
-    let report = close(&file, &[record], &[], &mut |_| {}).unwrap().report;
+    let report = close(&file, &[record], &[]).unwrap().report;
     let structure = &report.structure;
     assert_eq!(structure.without_effect, ["squared"], "{structure:?}");
     assert_eq!(structure.hidden, ["squared"], "{structure:?}");

@@ -140,11 +140,8 @@ fn a_record_of_one_balance_is_checked_before_it_is_believed() {
     let turned = mass(|_, [t, x, f]| [t, x, -f]).unwrap().report;
     let number = number(&turned, "mass");
     assert!(number.is_at_bound && number.value == 0.0, "{number:?}");
-    assert!(
-        turned.notes.iter().any(|note| note.contains("mass ended at the end of its range")),
-        "{:?}",
-        turned.notes
-    );
+    let said = "mass ended at the end of its range";
+    assert!(turned.notes.iter().any(|note| note.contains(said)), "{:?}", turned.notes);
 
     let stuck = mass(|k, [t, x, f]| if k < 3500 { [t, 0.05, f] } else { [t, x, f] });
     let message = stuck.unwrap_err().to_string();

@@ -41,13 +41,8 @@ pub(crate) fn named(report: &ModelReport) -> Vec<&str> {
     report.named.iter().map(|named| named.suspect.as_str()).collect()
 }
 
-pub(crate) fn close(
-    file: &Path,
-    train: &[PathBuf],
-    tests: &[PathBuf],
-    progress: &mut dyn FnMut(&str),
-) -> Result<ClosedModel, ModelError> {
-    close_with(file, (train, tests), Search::MoreThanNoise, progress)
+pub(crate) fn close(file: &Path, train: &[PathBuf], tests: &[PathBuf]) -> Result<ClosedModel, ModelError> {
+    close_with(file, (train, tests), Search::MoreThanNoise, &mut |_| {})
 }
 
 pub(crate) fn close_with(

@@ -125,9 +125,6 @@ fn a_search_that_takes_minutes_is_not_made_unasked() {
     let report = close_with(&model, (&[train], &[]), Search::MoreThanNoise, &mut |_| {}).unwrap().report;
     assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{report:#?}");
     assert!(report.discovered.is_empty());
-    assert!(
-        report.notes.iter().any(|note| note.starts_with("nothing was searched: a simulation has 10")),
-        "{:?}",
-        report.notes
-    );
+    let said = "nothing was searched: a simulation has 10";
+    assert!(report.notes.iter().any(|note| note.starts_with(said)), "{:?}", report.notes);
 }

@@ -9,7 +9,7 @@ fn the_page_of_a_first_model_prints_what_comes() {
     let [file, train, test] =
         ["cart.toml", "cart-a.csv", "cart-b.csv"].map(|name| docs.join("first-model").join(name));
     let page = std::fs::read_to_string(docs.join("first-model.md")).unwrap();
-    let report = close(&file, &[train], &[test], &mut |_| {}).unwrap().report;
+    let report = close(&file, &[train], &[test]).unwrap().report;
     let mut lines = vec![format!("Cart: {}.", report.headline)];
     lines.extend(report.training.iter().chain(&report.held_out).map(|left| {
         format!(

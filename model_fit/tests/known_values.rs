@@ -40,7 +40,7 @@ fn a_fit_takes_the_mass_of_each_record_and_is_wrong_with_one_mass_for_both() {
     let train = [record(folder, "light/run.csv", 2.5), record(folder, "heavy.csv", 5.0)];
     let fitted = |text: &str| {
         let model = file(folder, "model.toml", text);
-        let report = close(&model, &train, &[], &mut |_| {}).unwrap_or_else(|error| panic!("{error}")).report;
+        let report = close(&model, &train, &[]).unwrap_or_else(|error| panic!("{error}")).report;
         (
             number(&report, "drag").value,
             report.training.iter().map(|left| left.rms_before).fold(0.0, f64::max),
@@ -62,7 +62,7 @@ fn a_record_that_is_not_listed_is_refused_by_its_name() {
     let model = file(folder.path(), "model.toml", MODEL);
     // The folder is a part of the name, too.
     let other = [record(folder.path(), "other/run.csv", 2.5)];
-    let message = close(&model, &other, &[], &mut |_| {}).unwrap_err().to_string();
+    let message = close(&model, &other, &[]).unwrap_err().to_string();
     let expected = "other/run.csv: parameters.mass.values of the model has no value of this record; it has light/run.csv, heavy.csv";
     assert!(message.contains(expected), "{message}");
 }

@@ -79,10 +79,8 @@ fn a_model_is_simulated_with_the_values_of_its_file_and_nothing_is_fitted() {
     let started = text.replace("start = 0", "start = \"fitted\"\nguess = 0");
     let model = file(folder.path(), "tank.toml", &started);
     let notes = simulate(&model, &record).unwrap().notes;
-    assert!(
-        notes.iter().any(|note| note.starts_with("the start of level is fitted by a close")),
-        "{notes:?}"
-    );
+    let said = "the start of level is fitted by a close";
+    assert!(notes.iter().any(|note| note.starts_with(said)), "{notes:?}");
 }
 
 #[test]
@@ -102,7 +100,7 @@ fn what_is_filled_into_a_hole_is_not_compared() {
         [("", 300), ("record.period_s = 0.5\n", 300), ("record.period_s = 0.5\nrows.every = 2\n", 150)]
     {
         let model = file(folder.path(), "tank.toml", &format!("{more}{TANK}"));
-        let report = close(&model, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
+        let report = close(&model, std::slice::from_ref(&record), &[]).unwrap().report;
         let left = &report.training[0];
         assert!(left.rows.abs_diff(expected) <= 1, "{more}: {left:?}");
         assert!(report.notes[0].contains("no row over 50.5 s"), "{:?}", report.notes);
@@ -123,7 +121,7 @@ fn a_spike_is_left_out_with_its_line() {
     let folder = tempfile::tempdir().unwrap();
     let model = file(folder.path(), "tank.toml", TANK);
     let record = file(folder.path(), "record.csv", &written(rows().into_iter().map(spiked)));
-    let report = close(&model, &[record], &[], &mut |_| {}).unwrap().report;
+    let report = close(&model, &[record], &[]).unwrap().report;
     assert!(report.training[0].rows == 399 && report.training[0].rms_before < 0.02, "{:?}", report.training);
 }
 
@@ -162,10 +160,8 @@ fn a_model_of_another_size_than_the_record_is_noted_with_the_factor() {
     let factor = said.strip_prefix("before the fit the model gives ").and_then(|rest| rest.split(' ').next());
     let factor: f64 = factor.and_then(|factor| factor.parse().ok()).unwrap_or_else(|| panic!("{said}"));
     assert!((500.0..1000.0).contains(&factor), "{said}");
-    assert!(
-        said.contains("of column level_V in V, of the inputs (pump_V in kV) and of the numbers"),
-        "{said}"
-    );
+    let expected = "of column level_V in V, of the inputs (pump_V in kV) and of the numbers";
+    assert!(said.contains(expected), "{said}");
     let said = of("value = 0.15", "value = 0.001");
     assert!(said.starts_with("before the fit the model gives 0.00"), "{said}");
 }
@@ -180,12 +176,9 @@ fn a_condition_that_few_rows_meet_is_said_with_what_it_reads() {
         preview_records(&model, std::slice::from_ref(&record)).unwrap_err().to_string()
     };
     let said = why("rows.where = \"pump > 50[V]\"");
-    assert!(
-        said.contains(
-            "0 rows meet [rows] of the model; 8 are needed: where pump > 50[V], and pump is 0 to 39.0 V; "
-        ),
-        "{said}"
-    );
+    let expected =
+        "0 rows meet [rows] of the model; 8 are needed: where pump > 50[V], and pump is 0 to 39.0 V; ";
+    assert!(said.contains(expected), "{said}");
     let said = why("rows.every = 20");
     assert!(said.contains("40 samples over 39.0 s, one of 20 is a row: is unit of the time right"), "{said}");
 }
@@ -198,7 +191,7 @@ fn a_model_that_explains_nothing_of_an_output_is_noted_first_and_on_top_of_the_p
         file(folder.path(), "record.csv", &written(rows))
     };
     let model = |text: &str| file(folder.path(), "tank.toml", text);
-    let closed = |text: &str, factor: f64| close(&model(text), &[record(factor)], &[], &mut |_| {}).unwrap();
+    let closed = |text: &str, factor: f64| close(&model(text), &[record(factor)], &[]).unwrap();
     let other = closed(TANK, 1e3);
     let [note, page] = [&other.report.notes[0], &other.page];
     assert!(note.contains("leaves more of seen") && note.contains("than its mean would"), "{note}");

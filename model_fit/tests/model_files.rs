@@ -1,7 +1,7 @@
 //! Model files closed on records that are simulated here, by another integrator, with a term hidden or none.
 
-use crate::closing::{close, file, number, random};
-use model_fit::{ClosedModel, ModelReport, Verdict, explain};
+use crate::closing::{close, close_with, file, number, random};
+use model_fit::{ClosedModel, ModelReport, Search, Verdict, explain};
 use std::path::Path;
 
 /// A mass on a spring, pushed by a force; what may be missing, and a decoy.
@@ -84,7 +84,7 @@ fn closed(folder: &Path, model: &str, hidden: impl Fn(f64, f64) -> f64 + Copy) -
     let model = file(folder, "oscillator.toml", model);
     let [train, more, test] = [("train.csv", 1), ("more.csv", 2), ("test.csv", 3)]
         .map(|(name, seed)| file(folder, name, &record(seed, hidden)));
-    close(&model, &[train, more], &[test], &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    close(&model, &[train, more], &[test]).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]
@@ -184,11 +184,8 @@ fn two_suspects_with_the_same_law_cannot_be_told_apart() {
     let named = &report.named[0];
     let caption = format!("{} in place of {} at equation of v, over x", named.alternatives[0], named.suspect);
     assert!(closed.page.contains(&caption), "what the other one looks like");
-    assert_eq!(
-        closed.page.matches("± 2 standard errors of its numbers").count(),
-        2,
-        "a band for each of both"
-    );
+    let bands = closed.page.matches("± 2 standard errors of its numbers").count();
+    assert_eq!(bands, 2, "a band for each of both");
     let mut names = [report.named[0].suspect.as_str(), report.named[0].alternatives[0].as_str()];
     names.sort_unstable();
     assert_eq!(names, ["cubic-stiffness", "cubic-too"]);
@@ -203,10 +200,8 @@ fn two_suspects_with_the_same_law_cannot_be_told_apart() {
     assert!(report.structure.twins.iter().any(|twins| twins.suspects == ["cubic-stiffness", "cubic-too"]));
     let train = [folder.path().join("train.csv")];
     let text = explain(&folder.path().join("oscillator.toml"), &train).unwrap();
-    assert!(
-        text.contains("cubic-stiffness and cubic-too: the same to these records (cosine 1.000)"),
-        "{text}"
-    );
+    let said = "cubic-stiffness and cubic-too: the same to these records (cosine 1.000)";
+    assert!(text.contains(said), "{text}");
 }
 
 /// A sine of 7 rad/s, fitted from 20: the squares over its frequency have a minimum in each lobe.
@@ -225,7 +220,7 @@ fn a_fit_from_several_starts_finds_the_lowest_minimum() {
              w = {{ unit = \"1/s\", value = 20, range = [0.1, 100] }}\n[outputs.y]\nvalue = \"size*sin(w*t)\"\n"
         );
         let model = file(folder.path(), "sine.toml", &text);
-        let report = close(&model, std::slice::from_ref(&record), &[], &mut |_| {}).unwrap().report;
+        let report = close(&model, std::slice::from_ref(&record), &[]).unwrap().report;
         number(&report, "w").value
     };
     assert!((frequency(0) - 7.0).abs() > 1.0, "from one start it stays in a lobe beside: {}", frequency(0));
@@ -269,7 +264,8 @@ fn a_held_out_record_that_cannot_be_judged_is_refused_before_a_fit() {
         let (model, train) = (file("oscillator.toml", model), file("train.csv", &good));
         let progress = &mut |said: &str| panic!("{hint}: {said} before the held-out record was checked");
         let refused =
-            close(&model, &[train], &[file("test.csv", test)], progress).map(|closed| closed.report.headline);
+            close_with(&model, (&[train], &[file("test.csv", test)]), Search::MoreThanNoise, progress)
+                .map(|closed| closed.report.headline);
         let message = refused.unwrap_err().to_string();
         assert!(message.contains(hint), "{hint}: {message}");
     }

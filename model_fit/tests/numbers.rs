@@ -32,7 +32,7 @@ fn record(step: f64, output: impl Fn(f64) -> f64) -> String {
 fn closed(folder: &Path, model: &str, train: &str, test: Option<&str>) -> ClosedModel {
     let (model, train) = (file(folder, "model.toml", model), file(folder, "train.csv", train));
     let tests: Vec<_> = test.into_iter().map(|test| file(folder, "test.csv", test)).collect();
-    close(&model, &[train], &tests, &mut |_| {}).unwrap_or_else(|error| panic!("{error}"))
+    close(&model, &[train], &tests).unwrap_or_else(|error| panic!("{error}"))
 }
 
 #[test]

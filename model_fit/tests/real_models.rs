@@ -98,18 +98,13 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
     let report = closed(&model, &train, &test);
     // At 3 bar it is worse by a tenth, which the headline says.
     assert_eq!((report.verdict, report.confirmed), (Verdict::Named, Some(false)), "{}", report.headline);
-    assert!(
-        report.headline.contains("taken back: on cyl25_friction_O-ring257_3bar.csv"),
-        "{}",
-        report.headline
-    );
+    let headline = &report.headline;
+    assert!(headline.contains("taken back: on cyl25_friction_O-ring257_3bar.csv"), "{headline}");
     // Two levels of pressure cannot tell the two forms apart: of forms that are as good the first of the file is taken.
     assert_eq!(report.named[0].suspect, "root-of-pressure");
     assert_eq!(report.named[0].alternatives, ["proportional-to-pressure"]);
-    assert!(report.headline.contains("in the form of root-of-pressure or proportional-to-pressure"));
-    assert!(
-        report.taken_back && report.headline.starts_with("pressure-dependent-friction is taken back: on ")
-    );
+    assert!(headline.contains("in the form of root-of-pressure or proportional-to-pressure"));
+    assert!(report.taken_back && headline.starts_with("pressure-dependent-friction is taken back: on "));
     let probability =
         |name: &str| report.suspects.iter().find(|one| one.suspect == name).unwrap().probability;
     let [root, line] = ["root-of-pressure", "proportional-to-pressure"].map(probability);
@@ -121,10 +116,8 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
     assert!(after <= 0.60 * before, "{before} {after}");
     let line: Vec<ResidualComparison> =
         report.held_out_alternatives.iter().map(|one| one.residual.clone()).collect();
-    assert_eq!(
-        (line.len(), report.held_out_alternatives[0].suspect.as_str()),
-        (2, "proportional-to-pressure")
-    );
+    let suspect = report.held_out_alternatives[0].suspect.as_str();
+    assert_eq!((line.len(), suspect), (2, "proportional-to-pressure"));
     let by_line = pooled(&line, |left| left.rms_after);
     assert!((by_line / before - 0.603).abs() < 0.005, "{by_line} {before}");
 }
@@ -162,17 +155,12 @@ fn what_fails_a_gate_beside_a_name_that_is_no_likelier_is_said_beside_it() {
         .map(|name| report.suspects.iter().find(|one| one.suspect == name).unwrap());
     assert!((scale.probability - buoyancy.probability).abs() < 0.01, "{scale:?} {buoyancy:?}");
     assert!(scale.decision.starts_with("taken"), "{scale:?}");
-    assert!(
-        buoyancy.decision.starts_with("cannot be told from what was taken, though it fails: folds"),
-        "{buoyancy:?}"
-    );
+    let said = "cannot be told from what was taken, though it fails: folds";
+    assert!(buoyancy.decision.starts_with(said), "{buoyancy:?}");
     assert_eq!(
         (report.verdict, &report.named[0].alternatives[..]),
         (Verdict::Ambiguous, &["buoyancy".to_owned()][..])
     );
-    assert!(
-        report.headline.starts_with("height-scale is missing; height-scale cannot be told from buoyancy"),
-        "{}",
-        report.headline
-    );
+    let said = "height-scale is missing; height-scale cannot be told from buoyancy";
+    assert!(report.headline.starts_with(said), "{}", report.headline);
 }
