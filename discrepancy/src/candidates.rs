@@ -281,18 +281,15 @@ mod tests {
         let all = Candidate::all(&rig, [true, true], true, &[]);
         assert!(all.len() > SHEETS.len());
         for candidate in all {
+            let name = candidate.name();
             for probe in candidate.probes() {
-                candidate.rig(&rig, &probe).unwrap_or_else(|error| panic!("{}: {error}", candidate.name()));
+                candidate.rig(&rig, &probe).unwrap_or_else(|error| panic!("{name}: {error}"));
                 let numbers = candidate.effect_parameters(&probe);
                 // A stiffness without end is held at what a file may say.
                 let moved = numbers.iter().zip(&probe).enumerate().filter(|(_, (_, z))| **z != 0.0);
                 for (key, (number, z)) in moved {
                     let back = candidate.coordinate(key, *number);
-                    assert!(
-                        (back - z).abs() < 1e-6,
-                        "{} key {key}: {z} comes back as {back}",
-                        candidate.name()
-                    );
+                    assert!((back - z).abs() < 1e-6, "{name} key {key}: {z} comes back as {back}");
                 }
             }
         }

@@ -233,10 +233,8 @@ mod tests {
         for step in ["close", "check", "name"] {
             let mut command = Cli::command();
             let usage = command.find_subcommand_mut(step).unwrap().render_usage().to_string();
-            assert!(
-                usage.contains(&format!("discrepancy {step} <--model MODEL | --rig RIG> --train")),
-                "{usage}"
-            );
+            let expected = format!("discrepancy {step} <--model MODEL | --rig RIG> --train");
+            assert!(usage.contains(&expected), "{usage}");
         }
     }
 }

@@ -141,11 +141,8 @@ fn is_fatal(checked: &Checked, kind: &str, column: &str, hint: &str) {
     let finding = &checked.report.findings[0];
     assert_eq!(finding.column.as_deref(), Some(column));
     assert!(finding.fatal && finding.line.is_some() && finding.text.contains(hint), "{}", finding.text);
-    assert!(
-        finding.text.contains(&format!("measurement.csv:{}: ", finding.line.unwrap())),
-        "{}",
-        finding.text
-    );
+    let place = format!("measurement.csv:{}: ", finding.line.unwrap());
+    assert!(finding.text.contains(&place), "{}", finding.text);
 }
 
 fn is_survived(checked: &Checked, kind: &str, row: usize) {

@@ -159,14 +159,10 @@ fn what_is_missing_is_named_beside_what_is_too_small_for_a_name() {
     ]);
     let found = found(&hidden, &[]);
     let (large, small): (Vec<_>, Vec<_>) = found.reported.effects.iter().partition(|effect| is_large(effect));
-    assert_eq!(
-        large.iter().map(|effect| effect.candidate.name()).collect::<Vec<_>>(),
-        ["piston-leakage drive"]
-    );
-    assert_eq!(
-        small.iter().map(|effect| effect.candidate.name()).collect::<Vec<_>>(),
-        ["heat-exchange drive"]
-    );
+    let [large, small] =
+        [large, small].map(|all| all.iter().map(|effect| effect.candidate.name()).collect::<Vec<_>>());
+    assert_eq!(large, ["piston-leakage drive"]);
+    assert_eq!(small, ["heat-exchange drive"]);
     assert_eq!(found.not_explained, None);
 }
 
@@ -271,9 +267,7 @@ fn a_law_of_a_library_is_screened_beside_a_rig_and_named() {
     for used in ["friction/presliding", "friction/stick-slip", "sensor/gain", "stiffness/play"] {
         let text = text.replacen("friction/position-dependent", used, 1);
         let message = discrepancy::suspects::read(&text, &file).unwrap_err().to_string();
-        assert!(
-            message.contains(&format!("suspects.toml:2:8: use: {used}: the rig takes terms that are added")),
-            "{message}"
-        );
+        let expected = format!("suspects.toml:2:8: use: {used}: the rig takes terms that are added");
+        assert!(message.contains(&expected), "{message}");
     }
 }

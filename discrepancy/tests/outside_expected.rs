@@ -20,10 +20,8 @@ fn the_expected_table_has_every_effect_and_the_page_says_the_same() {
     assert_eq!(table.keys().map(String::as_str).collect::<Vec<_>>(), names);
     for (effect, expected) in &table {
         let (balances, variables) = (&expected["balances"], &expected["variables"]);
-        assert!(
-            balances.iter().all(|balance| BALANCES.contains(&balance.as_str())),
-            "{effect}: {balances:?}"
-        );
+        let is_balance = |balance: &String| BALANCES.contains(&balance.as_str());
+        assert!(balances.iter().all(is_balance), "{effect}: {balances:?}");
         let is_variable = |variable: &String| {
             variable == "constant" || VARIABLES.iter().any(|known| known.name == variable)
         };

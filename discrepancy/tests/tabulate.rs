@@ -39,10 +39,8 @@ fn a_spring_that_is_no_candidate_is_added_as_a_table_that_closes_the_gap() {
     assert!(!outcome.extended.as_ref().expect("a usable record").contains(nearest));
     let outside = report.outside.as_ref().expect("of this verdict");
     assert!(outside.added && outside.why_not.is_none(), "{:?}", outside.why_not);
-    assert_eq!(
-        (outside.tables[0].balance.as_str(), outside.tables[0].variable.as_str()),
-        ("drive.force", "x")
-    );
+    let table = &outside.tables[0];
+    assert_eq!((table.balance.as_str(), table.variable.as_str()), ("drive.force", "x"));
 
     let closed: Vec<f64> = report.misfit.values().filter_map(|misfit| misfit.closed).collect();
     assert!(closed.len() >= 2 && closed.iter().all(|share| *share > 0.6), "{:?}", report.misfit);

@@ -69,12 +69,8 @@ fn a_number_has_the_unit_that_follows_from_what_is_bound() {
     assert_eq!(model.parameters[2].unit.text, "kg m^2");
     let stribeck = linear.replace("damping/quadratic", "friction/stribeck");
     let message = refused(&(rotary.clone() + &stribeck));
-    assert!(
-        message.contains(
-            "parameters.excess.value is missing: the library has none for this place, in kg m^2 s^-2"
-        ),
-        "{message}"
-    );
+    let expected = "parameters.excess.value is missing: the library has none for this place, in kg m^2 s^-2";
+    assert!(message.contains(expected), "{message}");
     let given = "parameters.excess = { unit = \"N m\", value = 1 }\n\
                  parameters.velocity = { unit = \"deg/s\", value = 5 }\n";
     let model = read(&(rotary + &stribeck + given));

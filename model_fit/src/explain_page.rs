@@ -170,10 +170,8 @@ parameters.lag = { value = 0.5 }
         ] {
             assert!(titles.contains(&title), "{title}\n{titles:#?}");
         }
-        assert!(
-            titles.iter().any(|title| title.starts_with("dlate/dt = (level_V - late)/lag")),
-            "{titles:#?}"
-        );
+        let lag = "dlate/dt = (level_V - late)/lag";
+        assert!(titles.iter().any(|title| title.starts_with(lag)), "{titles:#?}");
         let told = text(page.root_element()).join("\n");
         for said in [
             "A <tank>",

@@ -277,11 +277,8 @@ parameters.b = { unit = "1/s", value = 0.01, range = [-10, 10] }
         let baseline = select::fitted(&model, &records, &[], None).unwrap();
         let fitted = select::fitted(&model, &records, &[suspect], Some(&baseline)).unwrap();
         let curve = drawn((&fitted, &baseline), (&[suspect], None), has_law).pop().unwrap();
-        assert!(
-            curve.variable == "x" && curve.variable_unit == "mm" && curve.unit == "mm/s",
-            "{}",
-            curve.unit
-        );
+        let unit = &curve.unit;
+        assert!(curve.variable == "x" && curve.variable_unit == "mm" && unit == "mm/s", "{unit}");
         let numbers = report::numbers(&fitted, &baseline, has_law);
         let of_suspect = numbers.iter().filter(|number| number.suspect.is_some());
         let of_suspect: Vec<_> =

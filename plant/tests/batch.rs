@@ -1,10 +1,8 @@
 //! A batch moves each of its rigs to the bit as the rig moves by itself, in whatever registers and beside whatever neighbours.
 
-use crate::scenario;
+use crate::scenario::{self, Kind, Scenario};
 use plant::faults::{AxisFaults, Faults, SupplyFault, ValveFault};
 use plant::{Batch, Inputs, Plant, Registers, RigParameters, Sensors, Setup, State};
-
-use crate::scenario::{Kind, Scenario};
 
 /// Every number of a state to the bit, signs of zero included.
 fn bits(state: &State) -> Vec<u64> {

@@ -49,10 +49,8 @@ fn a_file_with_terms_is_read_as_it_was_written_numbers_to_the_bit() {
     let [eddy, drift] = rig.terms() else { panic!("two terms") };
     assert_eq!((eddy.name.as_str(), eddy.axis, eddy.target), ("term-0", Axis::Drive, Target::Force));
     assert_eq!((drift.axis, drift.target), (Axis::Load, Target::PressureB));
-    assert_eq!(
-        eddy.numbers().iter().map(|number| number.range).collect::<Vec<_>>(),
-        [[0.0, 200.0], [0.12; 2]]
-    );
+    let ranges: Vec<_> = eddy.numbers().iter().map(|number| number.range).collect();
+    assert_eq!(ranges, [[0.0, 200.0], [0.12; 2]]);
     let changed = eddy.with(&[100.0 / 3.0, 0.12]).expect("in range");
     let again = written_again(&[changed.clone(), drift.clone()]);
     assert_eq!(again, rig.with_term(&changed));

@@ -19,6 +19,11 @@ fn table(sheet: &Sheet, place: Place, numbers: &[f64]) -> String {
     format!("[effects.{}.{place}]\n{}", sheet.name, keys.collect::<String>())
 }
 
+/// A key of an effect as messages write it.
+fn path(sheet: &Sheet, place: Place, key: &EffectKey) -> String {
+    format!("effects.{}.{place}.{}", sheet.name, key.name)
+}
+
 /// A value inside the range, another one for each key.
 fn inside(key: &EffectKey) -> f64 {
     key.min + 0.37 * (key.max - key.min)
@@ -54,14 +59,11 @@ fn each_effect_is_switched_on_at_each_place_of_its_kind() {
 #[test]
 fn the_sheets_fit_their_own_ranges_and_no_two_have_one_name() {
     for (i, sheet) in SHEETS.iter().enumerate() {
-        assert!(SHEETS[..i].iter().all(|other| other.name != sheet.name), "{}", sheet.name);
-        assert!(
-            !sheet.keys.is_empty() && !sheet.law.is_empty() && !sheet.source.is_empty(),
-            "{}",
-            sheet.name
-        );
+        let name = sheet.name;
+        assert!(SHEETS[..i].iter().all(|other| other.name != name), "{name}");
+        assert!(!sheet.keys.is_empty() && !sheet.law.is_empty() && !sheet.source.is_empty(), "{name}");
         for key in sheet.keys {
-            let what = format!("{}.{}", sheet.name, key.name);
+            let what = format!("{name}.{}", key.name);
             let allowed = key.min..=key.max;
             assert!(key.min.is_finite() && key.max.is_finite() && key.min < key.max, "{what}");
             assert!(key.drawn[0] < key.drawn[1] && key.drawn.iter().all(|d| allowed.contains(d)), "{what}");
@@ -90,15 +92,10 @@ fn both_ends_of_each_range_are_taken_and_what_lies_just_outside_is_refused() {
                 (f64::NEG_INFINITY, "-inf".to_owned()),
             ] {
                 numbers[i] = value;
+                let (line, path, range) = (first_line() + 1 + i, path(sheet, place, key), key.range());
                 assert_eq!(
                     refused(&with(&table(sheet, place, &numbers))),
-                    format!(
-                        "my-rig.toml:{}: effects.{}.{place}.{} = {written} is out of range; allowed: {}",
-                        first_line() + 1 + i,
-                        sheet.name,
-                        key.name,
-                        key.range()
-                    )
+                    format!("my-rig.toml:{line}: {path} = {written} is out of range; allowed: {range}")
                 );
             }
         }
@@ -117,16 +114,9 @@ fn a_key_with_a_default_may_be_left_out_and_any_other_is_asked_for() {
             if let Some(default) = key.default {
                 assert_eq!(read(&text)[0].numbers[left_out], default);
             } else {
-                assert_eq!(
-                    refused(&text),
-                    format!(
-                        "my-rig.toml:{}: effects.{}.{place}.{} is missing; allowed is {}",
-                        first_line(),
-                        sheet.name,
-                        key.name,
-                        key.range()
-                    )
-                );
+                let (line, path, range) = (first_line(), path(sheet, place, key), key.range());
+                let wanted = format!("my-rig.toml:{line}: {path} is missing; allowed is {range}");
+                assert_eq!(refused(&text), wanted);
             }
         }
     }

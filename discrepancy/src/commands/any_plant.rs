@@ -248,15 +248,12 @@ mod tests {
         let of_rig = r#"{"schema_version": 1, "summary": ""}"#;
         let of_model = r#"{"schema_version": 1, "headline": ""}"#;
         assert!(read(of_rig, false).is_ok() && read(of_model, true).is_ok());
-        let refused = read(of_rig, true).unwrap_err();
-        assert!(
-            refused.contains("the report of a rig file, and a model file is to be extended"),
-            "{refused}"
-        );
-        let refused = read(of_model, false).unwrap_err();
-        assert!(
-            refused.contains("the report of a model file, and a rig file is to be extended"),
-            "{refused}"
-        );
+        for (text, is_of_model, said) in [
+            (of_rig, true, "the report of a rig file, and a model file is to be extended"),
+            (of_model, false, "the report of a model file, and a rig file is to be extended"),
+        ] {
+            let refused = read(text, is_of_model).unwrap_err();
+            assert!(refused.contains(said), "{refused}");
+        }
     }
 }

@@ -144,9 +144,8 @@ mod tests {
         ] {
             assert!(text.contains(line), "{line}{text}");
         }
-        assert!(
-            listed("sensor").unwrap().contains("step [V], of dimension place: give its value, not fitted")
-        );
+        let said = "step [V], of dimension place: give its value, not fitted";
+        assert!(listed("sensor").unwrap().contains(said));
         let all: Vec<String> = Library::all().iter().map(lines).collect();
         assert!(all.iter().all(|library| library.lines().all(|line| !line.ends_with(' '))), "{all:?}");
     }
@@ -166,10 +165,8 @@ mod tests {
         assert!(of_user(&format!("{path}/lap")).unwrap_err().contains("'lap' is not in"));
         std::fs::write(&file, text.replace("k*v", "k*w")).unwrap();
         let why = of_user(&path).unwrap_err();
-        assert!(
-            why.contains("seals.toml:6: lip: 'w' is no variable of the library and no number of the suspect"),
-            "{why}"
-        );
+        let said = "seals.toml:6: lip: 'w' is no variable of the library and no number of the suspect";
+        assert!(why.contains(said), "{why}");
     }
 
     #[test]

@@ -122,14 +122,8 @@ fn curve(variable: &str, variable_unit: &str, unit: &str, term: impl Fn(f64) -> 
     let value: Vec<f64> = at.iter().map(|x| term(*x)).collect();
     let largest = value.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
     let band = at.iter().map(|x| largest * (0.04 + 0.15 * (x / reach).powi(4))).collect();
-    Curve {
-        variable: variable.to_owned(),
-        variable_unit: variable_unit.to_owned(),
-        unit: unit.to_owned(),
-        at,
-        value,
-        band,
-    }
+    let [variable, variable_unit, unit] = [variable, variable_unit, unit].map(str::to_owned);
+    Curve { variable, variable_unit, unit, at, value, band }
 }
 
 fn term(balance: &str, variable: &str) -> LocatedTerm {

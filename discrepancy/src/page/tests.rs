@@ -148,10 +148,8 @@ fn of_something_outside_the_catalogue_the_rig_file_is_judged_until_a_law_was_add
     assert!(headline(&report).starts_with("The held-out record does not confirm what was found outside"));
     report.verification.as_mut().unwrap().worse = true;
     let seen = headline(&report);
-    assert!(
-        seen.starts_with("Something is missing that the catalogue does not have, and what was fitted"),
-        "{seen}"
-    );
+    let said = "Something is missing that the catalogue does not have, and what was fitted";
+    assert!(seen.starts_with(said), "{seen}");
 }
 
 #[test]

@@ -86,12 +86,8 @@ fn the_true_model_closes_the_gap_and_a_wrong_sign_does_not() {
     let verified = judged(&rig, &truth, &record);
     let seen = &verified.verification;
     assert!(seen.confirmed, "{seen:?}");
-    let closed_shares: Vec<f64> = verified.misfit.values().filter_map(|misfit| misfit.closed).collect();
-    assert!(
-        !closed_shares.is_empty() && closed_shares.iter().all(|closed| *closed > 0.95),
-        "{:?}",
-        verified.misfit
-    );
+    let closed: Vec<f64> = verified.misfit.values().filter_map(|misfit| misfit.closed).collect();
+    assert!(!closed.is_empty() && closed.iter().all(|closed| *closed > 0.95), "{:?}", verified.misfit);
     let run = seen.free_run_nrmse_percent["drive_position_m"];
     assert!(run.after < 0.2 * run.before, "{run:?}");
     let white = seen.whiteness["drive_position_m"];
