@@ -19,7 +19,7 @@ use crate::ping_pong::grants;
 use crate::recorded_log::{RecordedLog, RecordedLogError};
 use crate::say;
 use cli::ReplayArguments;
-use play::{EndReason, ReplayStatistics, play, take_rig_frames};
+use play::{ReplayEnd, ReplayStatistics, play, take_rig_frames};
 use protocol::bus::{self, Bus, BusError, StampClock};
 use protocol::exit::Exit;
 use realtime::{Clock, Interrupt, MonotonicClock, write_hlog};
@@ -122,10 +122,10 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
         write(out, arguments, &log, &schedule, &played, started)?;
     }
     Ok(match played.end {
-        EndReason::Interrupted => Exit::Interrupted,
-        EndReason::LiveRig => Exit::BusFailed,
-        EndReason::Completed if played.dropped > 0 => Exit::BusFailed,
-        EndReason::Completed => Exit::Good,
+        ReplayEnd::Interrupted => Exit::Interrupted,
+        ReplayEnd::LiveRig => Exit::BusFailed,
+        ReplayEnd::Completed if played.dropped > 0 => Exit::BusFailed,
+        ReplayEnd::Completed => Exit::Good,
     })
 }
 
@@ -155,9 +155,9 @@ fn print_statistics(schedule: &Schedule, played: &ReplayStatistics) {
     let Schedule { left_out, error_frames, disordered, .. } = schedule;
     let total = schedule.frames.len();
     let how = match played.end {
-        EndReason::Completed => "",
-        EndReason::Interrupted => ", then interrupted",
-        EndReason::LiveRig => {
+        ReplayEnd::Completed => "",
+        ReplayEnd::Interrupted => ", then interrupted",
+        ReplayEnd::LiveRig => {
             ", then stopped: a rig came alive on the bus, and what follows would disturb it"
         }
     };

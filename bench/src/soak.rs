@@ -45,7 +45,7 @@ use realtime::Interrupt;
 use runlog::conditions::Conditions;
 use runlog::process::Process;
 use runlog::run_folder::{CONDITIONS_JSON, FileError, SCHEMA_VERSION, write_json};
-use segment::{EndReason, Outcome, SegmentContext};
+use segment::{Outcome, SegmentContext, SegmentEnd};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -179,15 +179,15 @@ impl SoakRun<'_> {
             };
             let (end, codes) = self.segment(keeping, rig_s)?;
             match end {
-                EndReason::DiskFull(free_bytes) => {
+                SegmentEnd::DiskFull(free_bytes) => {
                     let (free, out) = (free_bytes / 1_000_000, keeping.out.display());
                     let why = format!(
                         "the disk of {out} is nearly full, {free} MB are free: make room, or see --min-free-mb"
                     );
                     return Ok((Exit::BadInput, why));
                 }
-                EndReason::ProgramFailure(_) => early_in_a_row += 1,
-                EndReason::TimeUp | EndReason::Interrupted => early_in_a_row = 0,
+                SegmentEnd::ProgramFailure(_) => early_in_a_row += 1,
+                SegmentEnd::TimeUp | SegmentEnd::Interrupted => early_in_a_row = 0,
             }
             if early_in_a_row >= GIVE_UP_AFTER {
                 let why = format!(
@@ -204,7 +204,7 @@ impl SoakRun<'_> {
         &self,
         keeping: &mut SoakFolder,
         rig_s: f64,
-    ) -> Result<(EndReason, Vec<Option<i32>>), SoakError> {
+    ) -> Result<(SegmentEnd, Vec<Option<i32>>), SoakError> {
         let spec = self.plan.segment(keeping.next_number());
         let folder = keeping.out.join("segments").join(spec.folder());
         let (started_unix_s, began) = (unix_s(), Instant::now());
@@ -278,12 +278,12 @@ fn write_conditions(folder: &Path, spec: &plan::SegmentSpec, load: Option<&str>)
 
 fn end_text(outcome: &Outcome) -> String {
     match &outcome.end {
-        EndReason::TimeUp => "its time was up".into(),
-        EndReason::Interrupted => "interrupted".into(),
-        EndReason::DiskFull(free_bytes) => {
+        SegmentEnd::TimeUp => "its time was up".into(),
+        SegmentEnd::Interrupted => "interrupted".into(),
+        SegmentEnd::DiskFull(free_bytes) => {
             format!("the disk was nearly full: {} MB free", free_bytes / 1_000_000)
         }
-        EndReason::ProgramFailure(why) => why.clone(),
+        SegmentEnd::ProgramFailure(why) => why.clone(),
     }
 }
 

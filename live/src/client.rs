@@ -13,11 +13,11 @@ use std::sync::Arc;
 
 /// Capacity of the event queue of a client, bytes: some ten seconds.
 const QUEUE: usize = 1 << 20;
-/// Send buffer of a client's socket, bytes; the kernel doubles it.
+/// Send buffer of a client's socket, here and at the gateway, bytes; the kernel doubles it.
 pub const SEND_BUFFER: usize = 64 << 10;
 /// Longest time until a request is complete.
 const REQUEST_MS: u64 = 10_000;
-/// Longest time with a queue of which the client reads nothing.
+/// Longest time with a queue of which the client reads nothing, here and at the gateway.
 pub const STALLED_MS: u64 = 30_000;
 /// Longest time between the response and the end of the connection.
 const CLOSING_MS: u64 = 2_000;

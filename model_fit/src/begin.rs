@@ -437,7 +437,7 @@ mod tests {
         }
         std::fs::write(&record, text).unwrap();
         std::fs::write(&file, new_model(&record, Roles::default()).unwrap().text).unwrap();
-        let closed = crate::close_with(&file, (&[record], &[]), Search::MoreThanNoise, &mut |_| {}).unwrap();
+        let closed = crate::close(&file, (&[record], &[]), Search::MoreThanNoise, &mut |_| {}).unwrap();
         let value = |name: &str| closed.report.parameters.iter().find(|one| one.name == name).unwrap().value;
         assert!((value("lag_y") - 0.5).abs() < 0.01, "{}", value("lag_y"));
         assert!((value("gain_y_heater") - 2.5).abs() < 0.02, "{}", value("gain_y_heater"));

@@ -176,7 +176,7 @@ const MOST_STEPS_UNASKED: usize = 100_000;
 ///
 /// # Errors
 /// [`ModelError`] for a model or a record that cannot be used.
-pub fn close_with(
+pub fn close(
     file: &Path,
     (train, tests): (&[PathBuf], &[PathBuf]),
     search: Search,
@@ -263,7 +263,7 @@ pub struct RecordPreview {
     pub notes: Vec<String>,
 }
 
-/// Reads and checks records as [`close_with`] does, and fits nothing.
+/// Reads and checks records as [`close`] does, and fits nothing.
 ///
 /// # Errors
 /// [`ModelError`] for a model or a record that cannot be used.

@@ -51,7 +51,7 @@ pub(crate) fn close_with(
     search: Search,
     progress: &mut dyn FnMut(&str),
 ) -> Result<ClosedModel, ModelError> {
-    let closed = model_fit::close_with(file, records, search, progress)?;
+    let closed = model_fit::close(file, records, search, progress)?;
     let wrong = against_schema(&serde_json::to_value(&closed.report).unwrap());
     assert!(wrong.is_empty(), "{}: {}", file.display(), wrong.join("\n"));
     Ok(closed)

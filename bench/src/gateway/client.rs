@@ -27,7 +27,7 @@ const READ_A_TURN: usize = 4096;
 pub(super) enum EndReason {
     /// The client closed the connection, or its machine failed.
     ByClient,
-    /// It read nothing for 30 s, or sent requests without reading the answers.
+    /// It read nothing for [`STALLED_MS`], or sent requests without reading the answers.
     ReadsNothing,
     WithGateway,
     #[serde(untagged)]

@@ -17,7 +17,7 @@ const LEAD: Duration = Duration::from_millis(20);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub(super) enum EndReason {
+pub(super) enum ReplayEnd {
     /// After the last frame.
     #[serde(rename = "whole")]
     Completed,
@@ -28,7 +28,7 @@ pub(super) enum EndReason {
 }
 
 pub(super) struct ReplayStatistics {
-    pub(super) end: EndReason,
+    pub(super) end: ReplayEnd,
     /// Frames that the bus accepted.
     pub(super) sent: u64,
     /// Frames that it did not accept.
@@ -54,7 +54,7 @@ pub(super) fn play(
     interrupt: &Interrupt,
 ) -> ReplayStatistics {
     let mut played =
-        ReplayStatistics { end: EndReason::Completed, sent: 0, dropped: 0, error_ns: Recorder::new() };
+        ReplayStatistics { end: ReplayEnd::Completed, sent: 0, dropped: 0, error_ns: Recorder::new() };
     let start = clock.now() + LEAD;
     let disturbs = schedule.disturbs_a_rig();
     for next in &schedule.frames {
@@ -82,14 +82,14 @@ fn wait(
     due: Instant,
     disturbs: bool,
     interrupt: &Interrupt,
-) -> Option<EndReason> {
+) -> Option<ReplayEnd> {
     loop {
         if interrupt.came() {
-            return Some(EndReason::Interrupted);
+            return Some(ReplayEnd::Interrupted);
         }
         // Frames of others are always taken: a full queue would hide a rig.
         if take_rig_frames(bus) > 0 && disturbs {
-            return Some(EndReason::LiveRig);
+            return Some(ReplayEnd::LiveRig);
         }
         let now = clock.now();
         if now >= due {

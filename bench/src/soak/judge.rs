@@ -6,7 +6,7 @@ use super::evidence::{SegmentFiles, counts};
 use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
 use super::model::{Check, CheckResult, Figures};
 use super::plan::SegmentSpec;
-use super::segment::{EndReason, Outcome};
+use super::segment::{Outcome, SegmentEnd};
 use figures::thresholds::{self, ByRepetition, FigureValue};
 use figures::top::POSITIONS;
 use runlog::summary::{JudgedBound, ProcessReport};
@@ -70,7 +70,7 @@ fn result(name: &str, broken: &[String], good: impl Fn() -> String) -> Check {
 
 fn processes(outcome: &Outcome) -> Check {
     // Stopped by a signal, the rig exits with 130 after saving everything.
-    let asked = matches!(outcome.end, EndReason::Interrupted | EndReason::DiskFull(_));
+    let asked = matches!(outcome.end, SegmentEnd::Interrupted | SegmentEnd::DiskFull(_));
     let as_expected =
         |name: &str, code: Option<i32>| code == Some(0) || (asked && name == EMULATOR && code == Some(130));
     let mut broken: Vec<_> = outcome
@@ -79,7 +79,7 @@ fn processes(outcome: &Outcome) -> Check {
         .filter(|(name, (_, code, _))| !as_expected(name, *code))
         .map(|(name, (_, _, words))| format!("{name}: {words}, see {name}.txt"))
         .collect();
-    if let EndReason::ProgramFailure(why) = &outcome.end {
+    if let SegmentEnd::ProgramFailure(why) = &outcome.end {
         broken.insert(0, why.clone());
     }
     result("processes", &broken, || "all programs ended as they should".into())

@@ -38,7 +38,7 @@ pub(super) struct SegmentContext<'a> {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) enum EndReason {
+pub(super) enum SegmentEnd {
     TimeUp,
     /// The soak was asked to end.
     Interrupted,
@@ -50,7 +50,7 @@ pub(super) enum EndReason {
 
 /// Results of a segment besides its files.
 pub(super) struct Outcome {
-    pub end: EndReason,
+    pub end: SegmentEnd,
     /// Process number, exit code (`None` after a signal) and end in words of each program, by name.
     pub exits: BTreeMap<String, (u32, Option<i32>, String)>,
     pub memory: BTreeMap<String, Vec<Sample>>,
@@ -86,7 +86,7 @@ pub(super) fn run(
         progress,
         folder,
     );
-    if end != EndReason::TimeUp {
+    if end != SegmentEnd::TimeUp {
         // The rig's last tick ends the controllers after they received everything; so the rig ends first.
         running[0].interrupt();
         running[0].wait_until(Instant::now() + SAVE_TIMEOUT / 2);
@@ -192,35 +192,35 @@ impl ProcessMonitor {
         interrupt: &Interrupt,
         progress: &mut Progress<'_>,
         folder: &Path,
-    ) -> EndReason {
+    ) -> SegmentEnd {
         let latest = self.began + Duration::from_secs_f64(rig_s) + SAVE_TIMEOUT;
         loop {
             if self.began.elapsed() >= SAMPLE_PERIOD * self.samples as u32 {
                 self.sample(running);
                 if let Some(free) = procfs::free_bytes(folder).filter(|free| too_full(*free)) {
-                    return EndReason::DiskFull(free);
+                    return SegmentEnd::DiskFull(free);
                 }
                 progress(self.began.elapsed().as_secs_f64());
             }
             if interrupt.came() {
-                return EndReason::Interrupted;
+                return SegmentEnd::Interrupted;
             }
             let gone: Vec<_> =
                 running.iter_mut().filter_map(|one| (!one.is_running()).then(|| one.name.clone())).collect();
             let in_time = self.began.elapsed().as_secs_f64() >= rig_s;
             if gone.iter().any(|name| name == EMULATOR) && in_time {
-                return EndReason::TimeUp;
+                return SegmentEnd::TimeUp;
             }
             // Controllers receive the last tick slightly before the rig ends.
             if !gone.is_empty() && !in_time {
                 let after_s = self.began.elapsed().as_secs_f64();
-                return EndReason::ProgramFailure(format!(
+                return SegmentEnd::ProgramFailure(format!(
                     "{} ended after {after_s:.1} of {rig_s} s",
                     gone.join(" and ")
                 ));
             }
             if Instant::now() > latest {
-                return EndReason::ProgramFailure("the emulator did not end in time".into());
+                return SegmentEnd::ProgramFailure("the emulator did not end in time".into());
             }
             std::thread::sleep(POLL_PERIOD);
         }

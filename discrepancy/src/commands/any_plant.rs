@@ -4,7 +4,7 @@ use super::{CommandError, Exit, NameArguments, RecordArguments, print, progress,
 use crate::cli::{ExplainArguments, NewArguments, ReadArguments, SimulateArguments};
 use crate::folder::{self, Folder};
 use model_fit::{
-    AlternativeResidual, ClosedModel, Explanation, ModelReport, NewModel, Roles, Search, Verdict, close_with,
+    AlternativeResidual, ClosedModel, Explanation, ModelReport, NewModel, Roles, Search, Verdict, close,
     explained, extended, new_model, preview_records, read, simulate,
 };
 use pagekit::significant;
@@ -28,7 +28,7 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
         NameArguments { no_discover: true, .. } => Search::Never,
         _ => Search::MoreThanNoise,
     };
-    let closed = close_with(&records.rig, (&records.train, tests), search, &mut progress)?;
+    let closed = close(&records.rig, (&records.train, tests), search, &mut progress)?;
     // A formula that was not asked for explains nothing.
     let is_unexplained = closed.is_unexplained()
         || !arguments.discover

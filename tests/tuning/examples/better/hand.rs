@@ -14,31 +14,27 @@ const EXPERIMENT: &str = "manual-let-go";
 const PULL_N: f64 = 3.0;
 const PULL_TO_S: f64 = 60.0;
 
-struct ControllerVariant {
+struct LoadVariant {
     name: &'static str,
     load: &'static str,
     set: &'static [&'static str],
 }
 
-const VARIANTS: [ControllerVariant; 5] = [
-    ControllerVariant {
+const VARIANTS: [LoadVariant; 5] = [
+    LoadVariant {
         name: "valve shut",
         load: "force-manual",
         set: &["load.giving-way.gain_m_per_n_s=0", "load.giving-way.velocity_feed_forward=0"],
     },
-    ControllerVariant {
-        name: "P alone",
-        load: "force-plain",
-        set: &["load.giving-way.velocity_feed_forward=0"],
-    },
-    ControllerVariant { name: "P and feed-forward, no distinction", load: "force-plain", set: &[] },
+    LoadVariant { name: "P alone", load: "force-plain", set: &["load.giving-way.velocity_feed_forward=0"] },
+    LoadVariant { name: "P and feed-forward, no distinction", load: "force-plain", set: &[] },
     // No hand is as fast: as in manual-move-plain.
-    ControllerVariant {
+    LoadVariant {
         name: "always as at standstill, no distinction",
         load: "force-manual",
         set: &["load.force-chain.moving_m_per_s=1"],
     },
-    ControllerVariant { name: "manual mode, with its distinction", load: "force-manual", set: &[] },
+    LoadVariant { name: "manual mode, with its distinction", load: "force-manual", set: &[] },
 ];
 
 pub(crate) fn table() -> Result<(), Box<dyn Error>> {
