@@ -57,12 +57,14 @@ def main() -> int:
         print(__doc__, file=sys.stderr)
         return 2
     study, label, out = Path(sys.argv[1]), sys.argv[2], Path(sys.argv[3])
-    draws = 0
     with tarfile.open(out, "w:xz", preset=9) as archive:
-        for result in sorted((study / "runs" / label).glob("*/result.json")):
-            draws += 1
-            name = f"runs/{label}/{result.parent.name}"
-            add(archive, f"{name}/result.json", result.read_bytes())
+        results = sorted((study / "runs" / label).glob("*/result.json"))
+        draws = len(results)
+        # What came of proposed experiments stands beside.
+        results += sorted((study / "runs" / f"{label}-resolve").glob("*/resolution.json"))
+        for result in results:
+            name = f"runs/{result.parent.parent.name}/{result.parent.name}"
+            add(archive, f"{name}/{result.name}", result.read_bytes())
             report = result.with_name("report.json")
             if report.exists():
                 add(archive, f"{name}/report.json", scored(report.read_bytes()))
