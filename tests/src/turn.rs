@@ -5,6 +5,10 @@ use rustix::fs::{FlockOperation, flock};
 use std::fs::File;
 use std::path::PathBuf;
 
+/// What a controller says that was left without a processor for too long (`axis/src/chains/fault.rs`); `scripts/vm/job-functions`
+/// knows the same.
+pub const LATENESS: [&str; 3] = ["missed its time", "fell silent", "did not come to rest"];
+
 /// The machine, as long as it is held.
 pub struct MachineLock {
     _lock: File,

@@ -100,11 +100,9 @@ const ATTEMPTS: usize = 4;
 fn emulator_and_controller_say_and_send_on_it_what_they_do_on_vcan() {
     let _turn = turn::take();
     let expected = socketcan::texts(&expected().join("own-programs"));
-    // Its words for faults that only time makes, as scripts/vm/job-functions knows them.
-    let stalled = ["missed its time", "fell silent", "did not come to rest"];
     for attempt in 1.. {
         let texts = texts_of("own-programs.sh");
-        let is_stalled = texts.values().any(|text| stalled.iter().any(|words| text.contains(words)));
+        let is_stalled = texts.values().any(|text| turn::LATENESS.iter().any(|words| text.contains(words)));
         if attempt == ATTEMPTS || !is_stalled {
             assert_eq!(texts, expected);
             return;
