@@ -27,9 +27,9 @@ use crate::refit::{
 };
 use crate::report::{LocatedTerm, LocatedVariable};
 use crate::windows::{BLOCK, BLOCKS, FORCE, InputProducts, UnknownKind};
+use model_fit::parallel;
 use nalgebra::DMatrix;
 use plant::Axis;
-use rayon::prelude::*;
 
 /// Knots of the hats of a variable, at quantiles of its values.
 const KNOTS: usize = 8;
@@ -214,32 +214,26 @@ impl Term {
             .flat_map(|axis| BALANCES.map(|kinds| (axis, kinds)))
             .flat_map(|(axis, kinds)| Regressor::all().map(move |regressor| (axis, kinds, regressor)))
             .collect();
-        let mut groups: Vec<Group> = all
-            .into_par_iter()
-            .filter_map(|(axis, kinds, regressor)| {
-                // A singular fit has no evidence.
-                let products = self.with_terms(axis, kinds, regressor);
-                let count = products.columns - self.precisions.len();
-                let evidence = |size: f64| {
-                    let precision = size.powi(-2);
-                    let precisions: Vec<f64> = self
-                        .precisions
-                        .iter()
-                        .copied()
-                        .chain(std::iter::repeat_n(precision, count))
-                        .collect();
-                    let (with, with_determinant) = self.fitted(&products, &precisions);
-                    let spread = -(count as f64) * precision.ln();
-                    let log_evidence = -0.5 * (with - loss + spread + with_determinant - log_determinant);
-                    Group { axis, kinds, regressor, log_evidence, loss_reduction: loss - with }
-                };
-                SIZES
-                    .into_iter()
-                    .map(evidence)
-                    .filter(|group| group.log_evidence.is_finite())
-                    .max_by(|left, right| left.log_evidence.total_cmp(&right.log_evidence))
-            })
-            .collect();
+        let groups = parallel::map(&all, |&(axis, kinds, regressor)| {
+            // A singular fit has no evidence.
+            let products = self.with_terms(axis, kinds, regressor);
+            let count = products.columns - self.precisions.len();
+            let evidence = |size: f64| {
+                let precision = size.powi(-2);
+                let precisions: Vec<f64> =
+                    self.precisions.iter().copied().chain(std::iter::repeat_n(precision, count)).collect();
+                let (with, with_determinant) = self.fitted(&products, &precisions);
+                let spread = -(count as f64) * precision.ln();
+                let log_evidence = -0.5 * (with - loss + spread + with_determinant - log_determinant);
+                Group { axis, kinds, regressor, log_evidence, loss_reduction: loss - with }
+            };
+            SIZES
+                .into_iter()
+                .map(evidence)
+                .filter(|group| group.log_evidence.is_finite())
+                .max_by(|left, right| left.log_evidence.total_cmp(&right.log_evidence))
+        });
+        let mut groups: Vec<Group> = groups.into_iter().flatten().collect();
         groups.sort_by(|left, right| right.log_evidence.total_cmp(&left.log_evidence));
         groups
     }

@@ -15,11 +15,11 @@ use crate::fit::{self, Products};
 use crate::gridded_record::GriddedRecord;
 use crate::parameters::{COUNT, with_factors};
 use crate::windows::{ReferenceRun, VariableRanges, Windows, axis_by_axis, dot};
+use model_fit::parallel;
 use model_fit::stats::order_statistic;
 use plant::effects::leave_laws_alone;
 use plant::{Batch, RigParameters};
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 use std::sync::Mutex;
 
 /// Change of a factor in finite differences.
@@ -65,7 +65,7 @@ impl<'a> Engine<'a> {
     }
 
     fn with_steps(records: &'a [GriddedRecord], rig: &RigParameters, coarse: bool) -> Self {
-        let windows: Vec<Windows<'a>> = records.par_iter().map(|record| Windows::new(record, rig)).collect();
+        let windows = parallel::map(records, |record| Windows::new(record, rig));
         let axis_by_axis = windows.iter().all(Windows::axes_are_apart);
         let rows = windows.first().map_or(0, Windows::rows) / if axis_by_axis { 2 } else { 1 };
         let scaled_dof = windows.iter().flat_map(|windows| windows.dof(axis_by_axis)).collect();
@@ -88,8 +88,7 @@ impl<'a> Engine<'a> {
     /// The same records with the start states re-estimated under another rig. On linked rods micrometres decide whether they
     /// touch, so that each rig needs its own start states.
     pub(crate) fn with_starts_under(&self, rig: &RigParameters) -> Engine<'a> {
-        let windows: Vec<Windows<'a>> =
-            self.windows.par_iter().map(|windows| Windows::new(windows.record, rig)).collect();
+        let windows = parallel::map(&self.windows, |windows| Windows::new(windows.record, rig));
         let scaled_dof = windows
             .iter()
             .flat_map(|windows| windows.dof(self.axis_by_axis))
@@ -177,7 +176,7 @@ impl<'a> Engine<'a> {
 
     /// Runs of `rig` in all windows with the steps of the search, kept for [`Engine::simulate_where`].
     pub fn reference_runs(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
-        self.windows.par_iter().map(|windows| windows.reference_run(rig)).collect()
+        parallel::map(&self.windows, |windows| windows.reference_run(rig))
     }
 
     /// Readings of a neighbour of the reference rig: [`Windows::simulate_where`].
@@ -197,7 +196,7 @@ impl<'a> Engine<'a> {
         let alone = !rigs.iter().all(leave_laws_alone);
         let to_each = rigs.len().div_ceil(rayon::current_num_threads());
         let at_once = if alone { 1 } else { to_each.clamp(1, Batch::GROUP) };
-        let simulate = |rigs: &[RigParameters]| {
+        let simulate = |rigs: &&[RigParameters]| {
             let mut all = vec![Vec::new(); rigs.len()];
             for windows in &self.windows {
                 let simulated = windows.simulate_side_by_side(rigs);
@@ -205,14 +204,15 @@ impl<'a> Engine<'a> {
             }
             all
         };
-        rigs.par_chunks(at_once).flat_map_iter(simulate).collect()
+        let batches: Vec<&[RigParameters]> = rigs.chunks(at_once).collect();
+        parallel::map(&batches, simulate).into_iter().flatten().collect()
     }
 
     /// Finite differences: each rig of the first half minus its counterpart of the second half, over `change`.
     pub(crate) fn differences(&self, rigs: &[RigParameters], change: f64) -> Vec<Vec<f64>> {
         let simulated = self.simulate_side_by_side(rigs);
         let (up, down) = simulated.split_at(rigs.len() / 2);
-        up.par_iter().zip(down).map(|(up, down)| self.slope(up, down, change)).collect()
+        parallel::map_range(0..up.len(), |at| self.slope(&up[at], &down[at], change))
     }
 
     /// Whitened residual of a simulation.

@@ -47,11 +47,11 @@ use heterogeneity::{
     Heterogeneity, eliminate_heterogeneous, heterogeneity, parameter_spread, prefer_homogeneous, prefer_large,
 };
 use model_fit::estimator::RELINEARISED;
+use model_fit::parallel;
 pub(crate) use needed_parameters::significantly_off;
 use needed_parameters::with_needed;
 use null_distribution::NullDistribution;
 use plant::effects::sheet::Part;
-use rayon::prelude::*;
 use round::SelectionRound;
 use significance::Fitted;
 use start_states::{RefitWithInitialStates, refit_with_starts};
@@ -388,10 +388,10 @@ fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, 
     let rig = rig_of(&engine.rig, &model.effects, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);
     let residual = engine.residual(&simulated);
-    let model_sensitivities: Vec<Vec<f64>> = coordinates(&model.effects)
-        .into_par_iter()
-        .filter_map(|(at, key)| derivative(engine, &model.factors, &model.effects, &simulated, at, key))
-        .collect();
+    let sensitivities = parallel::map(&coordinates(&model.effects), |(at, key)| {
+        derivative(engine, &model.factors, &model.effects, &simulated, *at, *key)
+    });
+    let model_sensitivities: Vec<Vec<f64>> = sensitivities.into_iter().flatten().collect();
     columns.screen(engine, &linearisation, &residual, &model_sensitivities)
 }
 

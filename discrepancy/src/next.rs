@@ -44,9 +44,9 @@ use choice::{Probability, RehearsedEntry, WORTH_IT, rehearse, second};
 use closed_loop::{SEED, drive};
 use divergence::{Divergence, divergences};
 use menu::{Entry, MENU};
+use model_fit::parallel;
 use noise::ReadingNoise;
 use plant::RigParameters;
-use rayon::prelude::*;
 use refits::{Setting, axes_concerned};
 
 /// Maximum number of repetitions.
@@ -142,18 +142,16 @@ pub fn judge(
     let parameters = nuisance::nuisance_parameters().filter(|parameter| !named(parameter.name));
     let perturbed: Vec<_> =
         parameters.filter_map(|parameter| nuisance::perturbed(baseline, parameter).ok()).collect();
-    let pairs: Option<Vec<Vec<_>>> = (0..explanations.len())
-        .into_par_iter()
-        .map(|truth| {
-            let run = drive(entry, baseline, &explanations[truth].rig, SEED).ok()?;
-            let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
-            let alternatives: Vec<usize> = (0..explanations.len()).filter(|at| *at != truth).collect();
-            let rigs: Vec<_> = [truth].iter().chain(&alternatives).map(|at| &explanations[*at].rig).collect();
-            let values = divergences(&run, baseline, &rigs, &perturbed, axes_measured);
-            Some(alternatives.into_iter().zip(values).map(|(at, value)| (truth, at, value)).collect())
-        })
-        .collect();
-    Some(ExperimentDivergences { name: entry.name, pairs: pairs?.concat() })
+    let pairs = parallel::map_range(0..explanations.len(), |truth| {
+        let run = drive(entry, baseline, &explanations[truth].rig, SEED).ok()?;
+        let run = Some(run).filter(|run| run.ends_well(baseline.cylinder().stroke_m))?;
+        let alternatives: Vec<usize> = (0..explanations.len()).filter(|at| *at != truth).collect();
+        let rigs: Vec<_> = [truth].iter().chain(&alternatives).map(|at| &explanations[*at].rig).collect();
+        let values = divergences(&run, baseline, &rigs, &perturbed, axes_measured);
+        Some(alternatives.into_iter().zip(values).map(|(at, value)| (truth, at, value)).collect::<Vec<_>>())
+    });
+    let pairs: Vec<Vec<_>> = pairs.into_iter().collect::<Option<_>>()?;
+    Some(ExperimentDivergences { name: entry.name, pairs: pairs.concat() })
 }
 
 impl Proposal {

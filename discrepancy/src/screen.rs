@@ -9,7 +9,7 @@ use crate::engine::Engine;
 use crate::fit::{Fit, Products};
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Linearisation, parameter_precisions};
-use rayon::prelude::*;
+use model_fit::parallel;
 
 /// Penalty for each column of a candidate.
 pub(crate) const COLUMN_PENALTY: f64 = 6.0;
@@ -43,13 +43,10 @@ impl Columns {
             .enumerate()
             .flat_map(|(at, candidate)| candidate.probes().into_iter().map(move |probe| (at, probe)))
             .collect();
-        let made: Vec<Option<Vec<f64>>> = tasks
-            .par_iter()
-            .map(|(at, probe)| {
-                let rig = candidates[*at].rig(&engine.rig, probe).ok()?;
-                Some(engine.difference(&engine.simulate_coarsely(&rig), &baseline))
-            })
-            .collect();
+        let made = parallel::map(&tasks, |(at, probe)| {
+            let rig = candidates[*at].rig(&engine.rig, probe).ok()?;
+            Some(engine.difference(&engine.simulate_coarsely(&rig), &baseline))
+        });
         let mut probes = vec![Vec::new(); candidates.len()];
         let mut columns = Vec::new();
         for ((at, probe), column) in tasks.into_iter().zip(made) {
@@ -84,15 +81,12 @@ impl Columns {
         let joint = JointColumns::new(linearisation, model_sensitivities.len());
         let products = engine.products(residual, &all);
         let null_loss = joint.fit(&products).loss;
-        let screened = (0..self.candidates.len())
-            .into_par_iter()
-            .filter_map(|at| {
-                let BestColumns { loss, coordinates, .. } = self.best_columns(&products, at, &joint)?;
-                let start = EffectEstimate { candidate: self.candidates[at], coordinates };
-                Some(ScreenedCandidate { at, loss, start })
-            })
-            .collect();
-        (null_loss, screened)
+        let screened = parallel::map_range(0..self.candidates.len(), |at| {
+            let BestColumns { loss, coordinates, .. } = self.best_columns(&products, at, &joint)?;
+            let start = EffectEstimate { candidate: self.candidates[at], coordinates };
+            Some(ScreenedCandidate { at, loss, start })
+        });
+        (null_loss, screened.into_iter().flatten().collect())
     }
 
     /// All columns: of the parameters, of a model, of the probes.

@@ -33,8 +33,8 @@ use crate::name::lack_of_fit_per_dof;
 use crate::page::Trace;
 use crate::report::{BeforeAfter, SignalMisfit, Verification};
 use crate::windows::Windows;
-use model_fit::WORSE;
 use model_fit::stats::mean_and_variance;
+use model_fit::{WORSE, parallel};
 use null_power::NullPower;
 use plant::{Axis, RigParameters};
 use power::{Power, levels, pooled, untrimmed};
@@ -68,16 +68,14 @@ pub(crate) fn verify(
     progress: &mut dyn FnMut(&str),
 ) -> Verified {
     progress("held-out record in windows, before and after");
-    let (before, after) = both(before, after, record);
+    let [before, after] = parallel::map_pair([before, after], |rig| Model::new(record, rig));
     progress("held-out record: what noise alone would show");
     let part = record.thinned(searched_share(std::slice::from_ref(record)));
     let part = part.as_ref().map(|part| Model::new(part, &after.windows.rig));
     let null = NullPower::new(&after, part.as_ref());
     progress("held-out record: free run");
-    let (run_before, run_after) = rayon::join(
-        || free_run::free_run(record, &before.windows.rig),
-        || free_run::free_run(record, &after.windows.rig),
-    );
+    let [run_before, run_after] =
+        parallel::map_pair([&before, &after], |model| free_run::free_run(record, &model.windows.rig));
 
     let outputs = after.windows.outputs.len();
     let models = [&before, &after]
@@ -119,16 +117,8 @@ pub(crate) fn verify(
 
 /// Both models on a record for the page alone, without judgement.
 pub(crate) fn drawn(before: &RigParameters, after: &RigParameters, record: &GriddedRecord) -> Vec<Trace> {
-    let (before, after) = both(before, after, record);
+    let [before, after] = parallel::map_pair([before, after], |rig| Model::new(record, rig));
     traces::traces(&before, &after)
-}
-
-fn both<'a>(
-    before: &RigParameters,
-    after: &RigParameters,
-    record: &'a GriddedRecord,
-) -> (Model<'a>, Model<'a>) {
-    rayon::join(|| Model::new(record, before), || Model::new(record, after))
 }
 
 /// Whether a model leaves more than noise: above the null range, and by as much as an inadequate model of training records.

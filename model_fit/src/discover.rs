@@ -25,12 +25,12 @@ use super::fit::{Fitting, OPTIONS, Unknown, UnknownId};
 use super::judge::{Evaluation, GAIN_APART, judge};
 use super::record::MeasuredRecord;
 use super::select::{Fitted, MOST_TERMS, SAME, SearchResult, fitted, fitted_from};
+use crate::parallel;
 pub use described::DiscoveredTerm;
 use features::{Term, terms, variables};
 use model::{Failure, Model};
 pub(super) use place::located;
 pub use place::{Located, Place};
-use rayon::prelude::*;
 use screen::{Screen, coefficient};
 use std::path::Path;
 
@@ -161,7 +161,7 @@ fn round<'a>(
             .ok()
             .map(|fit| (suspect, fit))
     };
-    let mut fits: Vec<(usize, Fitted<'a>)> = best.par_iter().filter_map(fit).collect();
+    let mut fits: Vec<(usize, Fitted<'a>)> = parallel::map(best, fit).into_iter().flatten().collect();
     let least = fits.iter().min_by(|(_, one), (_, other)| one.point.loss.total_cmp(&other.point.loss))?;
     let effective = least.1.effective.clone();
     let judged: Vec<Evaluation> = fits

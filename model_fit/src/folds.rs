@@ -14,9 +14,9 @@ use super::fit::{Fitting, Point, UnknownId};
 use super::normal::{Normal, solved};
 use super::record::MeasuredRecord;
 use super::select::Fitted;
+use crate::parallel;
 use crate::stats::mean;
 use nalgebra::DVector;
-use rayon::prelude::*;
 
 /// Squares of folds, output by output.
 pub(super) type Folds = Vec<Vec<f64>>;
@@ -122,7 +122,7 @@ pub(super) fn refitted(fitted: &Fitted<'_>) -> Option<Folds> {
         };
         Some((0..fitting.model.outputs.len()).map(squares).collect())
     };
-    (0..cut.blocks).into_par_iter().map(without).collect()
+    parallel::map_range(0..cut.blocks, without).into_iter().collect()
 }
 
 /// Folds in units of what `reference` leaves of each output.

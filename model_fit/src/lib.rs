@@ -38,6 +38,7 @@
 //! | `declared` | what a model file declares beside its equations, by which its versions are told apart |
 //! | `extended` | the model file with what was found |
 //! | [`estimator`] | Gauss-Newton of every nonlinear fit, that of the rig too: options, globalisation, outcome |
+//! | [`parallel`] | independent computations on all cores |
 //! | [`stats`], [`quantum`], [`equal_runs`] | order statistics and means; rounding and stuck values of a column |
 //!
 //! Held-out records are read and checked before a fit starts, and no value of theirs enters one: they wait until the terms are
@@ -45,6 +46,7 @@
 
 pub mod equal_runs;
 pub mod estimator;
+pub mod parallel;
 pub mod quantum;
 pub mod stats;
 

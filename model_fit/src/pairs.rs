@@ -18,8 +18,8 @@ use super::progress::ProgressCounter;
 use super::select::{Fitted, SearchResult, fitted_from};
 use super::starts;
 use super::structure::{self, LinearisedFit};
+use crate::parallel;
 use nalgebra::DVector;
-use rayon::prelude::*;
 
 /// Pairs that are fitted in the simulator, and points of each from which that starts.
 pub(super) const FITTED: usize = 4;
@@ -73,12 +73,12 @@ fn fitted_pairs<'a>(
         alone.iter().filter(|(suspect, _)| !suspects[*suspect].is_decoy).collect();
     let tried = alone.len() * alone.len().saturating_sub(1) / 2;
     let responses = responses(base, &alone)?;
-    let fits = promising(&responses).into_par_iter().filter_map(|(pair, points)| {
-        let fit = fit(found, &alone, &responses, pair, &points);
+    let fits = parallel::map(&promising(&responses), |(pair, points)| {
+        let fit = fit(found, &alone, &responses, *pair, points);
         done.increment();
         fit
     });
-    let fits: Vec<([usize; 2], Fitted<'a>)> = fits.collect();
+    let fits: Vec<([usize; 2], Fitted<'a>)> = fits.into_iter().flatten().collect();
     let least = fits.iter().min_by(|(_, one), (_, other)| one.point.loss.total_cmp(&other.point.loss))?;
     let effective = least.1.effective.clone();
     let of_alone = |suspect: usize| alone.iter().find(|(one, _)| *one == suspect).map(|(_, fit)| fit);
@@ -162,7 +162,7 @@ fn responses(base: &Fitted<'_>, alone: &[&(usize, Fitted<'_>)]) -> Option<Vec<Re
         };
         points.filter_map(response).collect()
     };
-    Some(alone.par_iter().flat_map_iter(of_suspect).collect())
+    Some(parallel::map(alone, of_suspect).into_iter().flatten().collect())
 }
 
 /// Pairs of suspects with the largest fall of the squares, each with the responses of its best points.

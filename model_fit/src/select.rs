@@ -17,9 +17,9 @@ use super::progress::{ProgressCounter, with_progress};
 use super::record::MeasuredRecord;
 use super::{covariance, starts};
 use crate::estimator::Convergence;
+use crate::parallel;
 use model::{Failure, Model, Program};
 use nalgebra::DVector;
-use rayon::prelude::*;
 use std::sync::OnceLock;
 
 /// Most terms that are taken.
@@ -118,7 +118,7 @@ pub(crate) fn search<'a>(
                 done.increment();
                 (*suspect, fit)
             };
-            open.par_iter().map(with).collect::<Vec<_>>()
+            parallel::map(&open, with)
         });
         let (mut tried, mut fits) = (Vec::new(), Vec::new());
         for (suspect, fit) in round {
@@ -222,7 +222,7 @@ impl<'a> SearchResult<'a> {
         };
         let all: Vec<_> = self.accepted.iter().flat_map(of).collect();
         with_progress(progress, ("fits in place of what was named", all.len()), |done| {
-            all.into_par_iter().map(|one| in_place(one, done)).collect()
+            parallel::map(&all, |one| in_place(*one, done))
         })
     }
 

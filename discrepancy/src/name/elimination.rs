@@ -5,7 +5,7 @@ use super::{Alternative, STEPS, THRESHOLD_FACTOR_SINGLE, axes_of, loss_on, relin
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Refit, linearise, refit_steps};
 use crate::screen::Columns;
-use rayon::prelude::*;
+use model_fit::parallel;
 
 /// Runners-up of an earlier round that are tried again after another effect joined.
 const SWAPPED: usize = 3;
@@ -48,14 +48,10 @@ impl Selection {
             }
         }
         progress(&format!("trying {} other combinations", tried.len()));
-        let best = tried
-            .par_iter()
-            .filter_map(|(at, rank, effects)| {
-                Some((*at, *rank, refit_steps(engine, &point, effects, STEPS)?))
-            })
-            .collect::<Vec<_>>()
-            .into_iter()
-            .min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
+        let refitted = parallel::map(&tried, |(at, rank, effects)| {
+            Some((*at, *rank, refit_steps(engine, &point, effects, STEPS)?))
+        });
+        let best = refitted.into_iter().flatten().min_by(|left, right| left.2.loss.total_cmp(&right.2.loss));
         let Some((at, rank, best)) = best.filter(|(_, _, best)| best.loss < model.loss) else { return };
         let best = relinearise(engine, best);
         // The replaced effect stays as an alternative where it fits as well.
@@ -91,17 +87,14 @@ impl Selection {
             let linearisation = linearise(engine, model);
             let left = NullDistribution::new(engine, columns, &linearisation, model);
             let threshold = left.threshold();
-            let without: Vec<Option<Refit>> = (0..model.effects.len())
-                .into_par_iter()
-                .map(|at| {
-                    let mut effects = model.effects.clone();
-                    effects.remove(at);
-                    if effects.is_empty() {
-                        return Some(calibrated.clone());
-                    }
-                    refit_steps(engine, &linearisation, &effects, 4)
-                })
-                .collect();
+            let without = parallel::map_range(0..model.effects.len(), |at| {
+                let mut effects = model.effects.clone();
+                effects.remove(at);
+                if effects.is_empty() {
+                    return Some(calibrated.clone());
+                }
+                refit_steps(engine, &linearisation, &effects, 4)
+            });
             let least = without
                 .into_iter()
                 .enumerate()

@@ -16,7 +16,7 @@ use crate::refit::{
     prior_deviations, prior_precisions, rig_of,
 };
 use model_fit::estimator::{Estimator, Iterate, JOINT, JOINT_COMPARED, Options, Step};
-use rayon::prelude::*;
+use model_fit::parallel;
 use std::borrow::Cow;
 
 /// Maximum number of exclusions of windows from a step, and the excess over the predicted squares that excludes one, in standard
@@ -34,7 +34,7 @@ pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COU
     let loss = |factors: &[f64; COUNT]| {
         iterate(engine, model.effects.clone(), *factors).map_or(f64::INFINITY, |iterate| iterate.loss)
     };
-    let losses: Vec<f64> = tried.par_iter().map(loss).collect();
+    let losses = parallel::map(&tried, loss);
     let best = (0..SHRINK_FACTORS.len()).min_by(|one, other| losses[*one].total_cmp(&losses[*other]));
     tried[best.expect("one at least")]
 }

@@ -23,7 +23,7 @@ use crate::parameters::COUNT;
 use crate::refit::{
     Linearisation, Refit, coordinate_columns, linearise, prior_precisions, refit_steps, rig_of,
 };
-use rayon::prelude::*;
+use model_fit::parallel;
 
 /// CV_B above which an effect neither comes first in a round nor stays in a model that lacks fit: right names had 0.01 to 0.24 on
 /// seed 13, a development seed, impostors 0.1 to 2. These figures are of the derivative that the whole response stands for since.
@@ -58,12 +58,10 @@ pub(super) fn prefer_homogeneous(
         let variation = amplitude_variation(engine, linearisation, fit);
         variation.and_then(|all| all.last().copied()).is_some_and(|variation| variation < MAX_CV_IN_SEARCH)
     };
-    let homogeneous: Vec<Refit> = fits
-        .par_iter()
-        .take(COMPARED)
-        .filter(|fit| gain(fit) > needed(fit) && is_homogeneous(fit))
-        .cloned()
-        .collect();
+    let compared = &fits[..fits.len().min(COMPARED)];
+    let stays = parallel::map(compared, |fit| gain(fit) > needed(fit) && is_homogeneous(fit));
+    let homogeneous: Vec<Refit> =
+        compared.iter().zip(stays).filter(|(_, stays)| *stays).map(|(fit, _)| fit.clone()).collect();
     let found = !homogeneous.is_empty();
     if found {
         *fits = homogeneous;

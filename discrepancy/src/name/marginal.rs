@@ -32,9 +32,9 @@ use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit, coordinate_columns, linearise, parameter_precisions, rig_of};
 use crate::report::{ExplanationKind, Marginal};
 use crate::windows::BLOCKS;
+use model_fit::parallel;
 use nalgebra::DMatrix;
 use priors::{prior_of, prior_of_coordinate, prior_of_terms, scaled};
-use rayon::prelude::*;
 
 /// Power of the likelihoods: the least mean log loss on one half of 32 draws of seed 18, a development seed.
 const POWER: f64 = 0.004;
@@ -73,26 +73,24 @@ fn marginals(
     explanations: &[Explanation],
 ) -> Option<Vec<Marginal>> {
     let sensitivities = linearise(engine, calibrated).columns;
-    let models: Vec<Model<'_>> = explanations
-        .par_iter()
-        .map(|one| {
-            let are_exact = one.kind == ExplanationKind::Null;
-            let alone = if are_exact { [1.0; COUNT] } else { calibrated.factors };
-            let (effects, factors) =
-                one.fit.as_ref().map_or((&[][..], alone), |fit| (&fit.effects[..], fit.factors));
-            Model::of(Estimates { engine, effects, factors }, &sensitivities, are_exact)
-        })
-        .collect::<Option<_>>()?;
+    let models = parallel::map(explanations, |one| {
+        let are_exact = one.kind == ExplanationKind::Null;
+        let alone = if are_exact { [1.0; COUNT] } else { calibrated.factors };
+        let (effects, factors) =
+            one.fit.as_ref().map_or((&[][..], alone), |fit| (&fit.effects[..], fit.factors));
+        Model::of(Estimates { engine, effects, factors }, &sensitivities, are_exact)
+    });
+    let models: Vec<Model<'_>> = models.into_iter().collect::<Option<_>>()?;
     let (grams, places) = inputs(engine, &sensitivities, &models)?;
     let of_memory = |memory: &f64| grams.integrated(*memory, &SIZES);
     let mut terms = vec![IntegratedInputs::none(grams.gram.len())];
-    terms.extend(MEMORIES.par_iter().map(of_memory).collect::<Vec<_>>().into_iter().flatten());
+    terms.extend(parallel::map(&MEMORIES, of_memory).into_iter().flatten());
     // A term under which a model has no mode adds nothing.
-    let of_model = |(model, places): (&Model<'_>, &Places)| -> Vec<[f64; 3]> {
-        let log = |term| model.log_likelihoods(term, places).unwrap_or([f64::NEG_INFINITY; 3]);
+    let of_model = |at: usize| -> Vec<[f64; 3]> {
+        let log = |term| models[at].log_likelihoods(term, &places[at]).unwrap_or([f64::NEG_INFINITY; 3]);
         terms.iter().map(log).collect()
     };
-    let logs: Vec<Vec<[f64; 3]>> = models.par_iter().zip(&places).map(of_model).collect();
+    let logs = parallel::map_range(0..models.len(), of_model);
     let kinds: Vec<ExplanationKind> = explanations.iter().map(|one| one.kind).collect();
     let priors: Vec<f64> = explanations.iter().map(|one| prior_of(one, candidates)).collect();
     let covariances: Vec<Covariance> = terms.iter().map(|term| term.covariance).collect();

@@ -13,7 +13,7 @@ use crate::refit::{
     Refit, coordinate_columns, coordinate_precision, linearise, prior_deviations, prior_precisions,
     refit_steps, rig_of,
 };
-use rayon::prelude::*;
+use model_fit::parallel;
 
 /// Grid points of the pitch.
 const PITCHES: u32 = 40;
@@ -43,13 +43,11 @@ fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
         effects[last].coordinates[pitch] = candidate.coordinate(pitch, at);
         effects
     };
-    let ripples: Vec<Vec<f64>> = pitches
-        .par_iter()
-        .map(|at| {
-            let rig = rig_of(&engine.rig, &with(PROBE, *at), &model.factors)?;
-            Some(engine.difference(&engine.simulate_coarsely(&rig), &coarse))
-        })
-        .collect::<Option<_>>()?;
+    let ripples = parallel::map(&pitches, |at| {
+        let rig = rig_of(&engine.rig, &with(PROBE, *at), &model.factors)?;
+        Some(engine.difference(&engine.simulate_coarsely(&rig), &coarse))
+    });
+    let ripples: Vec<Vec<f64>> = ripples.into_iter().collect::<Option<_>>()?;
     let linearisation = linearise(engine, model);
     let numbers = coordinate_columns(engine, &model.factors, &plain, &simulated)?;
     let always = COUNT + numbers.len();

@@ -13,7 +13,7 @@ use super::{LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, lac
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Linearisation, Refit, loss_at, refit_steps, relinearise_once};
 use crate::screen::{Columns, ScreenedCandidate};
-use rayon::prelude::*;
+use model_fit::parallel;
 
 /// Maximum number of candidates refitted in the simulator in each round.
 const CONTENDERS: usize = 6;
@@ -155,30 +155,24 @@ impl<'a> SelectionRound<'a> {
         progress: &mut dyn FnMut(&str),
     ) -> Option<Self> {
         let Contenders { null_loss, best, backlash } = contenders;
-        let mut fits: Vec<Refit> = best
-            .par_iter()
-            .filter_map(|screened| {
-                let start = best_start(engine, linearisation, &model.effects, screened, *null_loss);
-                refit_steps(engine, linearisation, &start, STEPS)
-            })
-            .collect();
+        let fits = parallel::map(best, |screened| {
+            let start = best_start(engine, linearisation, &model.effects, screened, *null_loss);
+            refit_steps(engine, linearisation, &start, STEPS)
+        });
+        let mut fits: Vec<Refit> = fits.into_iter().flatten().collect();
         sort(&mut fits);
         // These fits used the sensitivities of the model without the effect; the best are relinearised. Gains compare with the
         // null loss of the same sensitivities.
         let gain = null_loss - fits.first()?.loss;
         let near =
             fits.iter().take(RELINEARISED).filter(|fit| null_loss - fit.loss >= 0.5 * gain).count().max(1);
-        let once: Vec<Refit> =
-            fits[..near].par_iter().map(|fit| relinearise_once(engine, at_best_pitch(engine, fit))).collect();
+        let once = parallel::map(&fits[..near], |fit| relinearise_once(engine, at_best_pitch(engine, fit)));
         let most = once.iter().map(|fit| null_loss - fit.loss).fold(0.0, f64::max);
-        let restarted = once
-            .into_par_iter()
-            .map(|fit| {
-                let may_be_best = null_loss - fit.loss >= MAY_BE_BEST * most;
-                let fit = if may_be_best { relinearise(engine, fit) } else { fit };
-                refit_with_starts(engine, &fit)
-            })
-            .collect();
+        let restarted = parallel::map(&once, |fit| {
+            let may_be_best = null_loss - fit.loss >= MAY_BE_BEST * most;
+            let fit = if may_be_best { relinearise(engine, fit.clone()) } else { fit.clone() };
+            refit_with_starts(engine, &fit)
+        });
         let mut round = Self { fits, restarted };
         round.fits.splice(..near, round.restarted.iter().map(|restarted| restarted.fit.clone()));
         let least = round.fits.iter().map(|fit| fit.loss).fold(model.loss, f64::min);
@@ -203,7 +197,7 @@ impl<'a> SelectionRound<'a> {
         if close < 2 || engine.is_linked() {
             return;
         }
-        let fits: Vec<Refit> = self.fits[..close].par_iter().map(|fit| fit_all(engine, fit)).collect();
+        let fits = parallel::map(&self.fits[..close], |fit| fit_all(engine, fit));
         self.fits.splice(..close, fits);
         sort(&mut self.fits);
     }

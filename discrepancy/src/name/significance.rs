@@ -30,10 +30,10 @@ use crate::refit::{
 };
 use crate::report::{DrawnRecords, EffectPlace, ExplanationKind, Significance, StoppingReason, effect_place};
 use crate::screen::{COLUMN_PENALTY, Columns};
+use model_fit::parallel;
 use plant::RigParameters;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 use sequential::Sequential;
 
 /// Draws of both tests together. One of 39 may reach the gain at the level of a twentieth.
@@ -205,7 +205,7 @@ fn drawn_records(
     let mut ended = None;
     while ended.is_none() && test.drawn.len() < most {
         let from = test.drawn.len();
-        let gains: Vec<f64> = (from..most.min(from + AT_ONCE)).into_par_iter().map(&draw).collect();
+        let gains = parallel::map_range(from..most.min(from + AT_ONCE), &draw);
         ended = gains.into_iter().find_map(|gain| test.take(gain));
     }
     let ended = ended.unwrap_or(StoppingReason::AllDrawn);

@@ -2,7 +2,7 @@
 
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, loss_at, refit, rig_of};
-use rayon::prelude::*;
+use model_fit::parallel;
 
 /// Starting amplitudes of the backlash.
 const AMPLITUDES: [f64; 5] = [0.12, 0.25, 0.45, 0.7, 1.0];
@@ -58,13 +58,10 @@ pub(super) fn backlash_start(
             [model, &[effect]].concat()
         })
         .collect();
-    let losses: Vec<f64> = tried
-        .par_iter()
-        .map(|effects| {
-            rig_of(&engine.rig, effects, &linearisation.factors)
-                .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), linearisation, effects))
-        })
-        .collect();
+    let losses = parallel::map(&tried, |effects| {
+        rig_of(&engine.rig, effects, &linearisation.factors)
+            .map_or(f64::INFINITY, |rig| loss_at(&engine.with_starts_under(&rig), linearisation, effects))
+    });
     let best = (0..tried.len()).min_by(|left, right| losses[*left].total_cmp(&losses[*right]));
     tried[best.expect("one at least")].clone()
 }

@@ -16,7 +16,7 @@
 use super::MOST_REPETITIONS;
 use super::menu::Entry;
 use super::refits::{Seeds, Setting, Trial};
-use rayon::prelude::*;
+use model_fit::parallel;
 use std::cmp::Ordering;
 
 /// Trials of each explanation in the first round.
@@ -242,11 +242,9 @@ fn ranked(one: &RehearsedEntry, other: &RehearsedEntry) -> Ordering {
 
 /// Trials of all explanations in an entry, each in a closed-loop run of its own; `None` where one does not suit the rig.
 fn round(setting: &Setting<'_>, entry: &'static Entry, seeds: Seeds) -> Option<RehearsedEntry> {
-    let runs: Option<Vec<_>> = (0..setting.explanations.len())
-        .into_par_iter()
-        .map(|truth| setting.trials(entry, truth, seeds))
-        .collect();
-    let runs = runs?;
+    let runs =
+        parallel::map_range(0..setting.explanations.len(), |truth| setting.trials(entry, truth, seeds));
+    let runs: Vec<_> = runs.into_iter().collect::<Option<_>>()?;
     let clearance_m = runs.iter().map(|run| run.clearance_m).fold(f64::INFINITY, f64::min);
     let trials = runs.into_iter().flat_map(|run| run.trials).collect();
     Some(RehearsedEntry { name: entry.name, trials, length_s: entry.length_s(), clearance_m })

@@ -16,9 +16,9 @@ use crate::parameters::{COUNT, PARAMETERS, with_factors};
 use crate::refit::{MOST_OFF, Refit, has_factor_at_bound};
 use crate::windows::{ReferenceRun, VariableRanges};
 use model_fit::estimator::{Convergence, Estimator, Options, Outcome, Step, TABLES, TABLES_WITHIN};
+use model_fit::parallel;
 use plant::RigParameters;
 use plant::effects::tabulated::{Balance, Tabulated};
-use rayon::prelude::*;
 
 /// Steps of finite differences: N, Nl/min; and as a share of the value.
 const FORCE_CHANGE_N: f64 = 1.0;
@@ -237,21 +237,19 @@ fn columns(
     reference_runs: &[ReferenceRun],
 ) -> Option<Vec<Vec<f64>>> {
     let from: Vec<f64> = reference_runs.iter().flat_map(|run| &run.simulated).copied().collect();
-    coordinates
-        .par_iter()
-        .map(|coordinate| {
-            let change = model.change(*coordinate);
-            let rig = model.perturbed(*coordinate, change).rig(engine)?;
-            let simulated = match coordinate {
-                Coordinate::Factor(_) => engine.simulate_coarsely(&rig),
-                Coordinate::Value(at, point) => {
-                    let fitted = &model.tables[*at];
-                    engine.simulate_where(&rig, reference_runs, |ranges| fitted.acts(*point, ranges))
-                }
-            };
-            Some(engine.slope(&simulated, &from, change))
-        })
-        .collect()
+    let columns = parallel::map(coordinates, |coordinate| {
+        let change = model.change(*coordinate);
+        let rig = model.perturbed(*coordinate, change).rig(engine)?;
+        let simulated = match coordinate {
+            Coordinate::Factor(_) => engine.simulate_coarsely(&rig),
+            Coordinate::Value(at, point) => {
+                let fitted = &model.tables[*at];
+                engine.simulate_where(&rig, reference_runs, |ranges| fitted.acts(*point, ranges))
+            }
+        };
+        Some(engine.slope(&simulated, &from, change))
+    });
+    columns.into_iter().collect()
 }
 
 pub(super) struct TableLinearisation {

@@ -3,15 +3,15 @@
 use super::Model;
 use super::power::{Power, levels, pooled, sums, untrimmed};
 use crate::windows::Windows;
+use model_fit::parallel;
 use model_fit::stats::mean_and_variance;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
-use rayon::prelude::*;
 
 /// Draws of noise.
-const DRAWS: u64 = 60;
+const DRAWS: usize = 60;
 /// Synthetic records.
-const RECORDS: u64 = 8;
+const RECORDS: usize = 8;
 /// Fixed seed: the range is a result and has the same bits in each run.
 const SEED: u64 = 0x7e1d_0c7a_11ed_0006;
 /// 97.5th percentiles of the standard normal, and of Student's t with the degrees of freedom of the synthetic records.
@@ -50,10 +50,9 @@ impl NullPower {
     /// All but the range, and the standard deviation of the joint power of noise.
     fn of_noise(windows: &Windows<'_>) -> (Self, f64) {
         let outputs = windows.outputs.len();
-        let draws: Vec<Vec<f64>> = (0..DRAWS)
-            .into_par_iter()
-            .map(|draw| sums(&windows.noise(&mut Pcg64::seed_from_u64(SEED ^ draw)), outputs))
-            .collect();
+        let draws = parallel::map_range(0..DRAWS, |draw| {
+            sums(&windows.noise(&mut Pcg64::seed_from_u64(SEED ^ draw as u64)), outputs)
+        });
         // Windows differ in their degrees of freedom; outputs without samples have none.
         let mut expected = vec![0.0; windows.count() * outputs];
         for draw in &draws {
@@ -83,16 +82,13 @@ impl NullPower {
     fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
         let outputs = model.windows.outputs.len();
         let sensitivities = model.windows.sensitivities();
-        let left: Vec<f64> = (0..RECORDS)
-            .into_par_iter()
-            .map(|draw| {
-                let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw));
-                let windows = model.windows.redrawn(&model.simulated, &sensitivities, &mut random);
-                let residual = windows.residual(&windows.simulate(&windows.rig));
-                let power = Power::new(&sums(&residual, outputs), &self.expected, outputs);
-                joint(&power.divided_by_levels(&levels(&power, self)))
-            })
-            .collect();
+        let left = parallel::map_range(0..RECORDS, |draw| {
+            let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw) as u64);
+            let windows = model.windows.redrawn(&model.simulated, &sensitivities, &mut random);
+            let residual = windows.residual(&windows.simulate(&windows.rig));
+            let power = Power::new(&sums(&residual, outputs), &self.expected, outputs);
+            joint(&power.divided_by_levels(&levels(&power, self)))
+        });
         spread(&left)
     }
 }

@@ -12,9 +12,9 @@ use super::whiten::SPIKE;
 use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, dot, project, set_state};
 use crate::sensor_inverse::SensorInverse;
 use crate::unknown_inputs::{NORMAL_LITRES_PER_MINUTE, add_air, pushed};
+use model_fit::parallel;
 use nalgebra::DMatrix;
 use plant::{Inputs, Plant, RigParameters};
-use rayon::prelude::*;
 
 /// Periods of a block; a window has [`BLOCKS`].
 pub(crate) const BLOCK: usize = 20;
@@ -75,36 +75,35 @@ impl Windows<'_> {
         axis_by_axis: bool,
     ) -> Option<Vec<InputProducts>> {
         let rows = self.rows();
-        self.plants_at_windows(rig)
-            .par_iter()
-            .enumerate()
-            .map(|(at, plant)| {
-                let mut products = InputProducts {
-                    gram: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
-                    cross: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
-                };
-                for axis in (0..2).filter(|axis| self.record.measured[*axis]) {
-                    let mut responses = self.responses(at, plant, axis)?;
-                    if axis_by_axis {
-                        responses.iter_mut().for_each(|response| *response = super::axis_by_axis(response));
-                    }
-                    let count = responses.len();
-                    let mut gram = DMatrix::zeros(count, count);
-                    for left in 0..count {
-                        for right in 0..=left {
-                            let product = dot(&responses[left], &responses[right]);
-                            gram[(left, right)] = product;
-                            gram[(right, left)] = product;
-                        }
-                    }
-                    products.gram[axis] = gram;
-                    products.cross[axis] = DMatrix::from_fn(columns.len(), count, |column, response| {
-                        dot(&columns[column][at * rows..][..rows], &responses[response])
-                    });
+        let plants = self.plants_at_windows(rig);
+        let products = parallel::map_range(0..plants.len(), |at| {
+            let plant = &plants[at];
+            let mut products = InputProducts {
+                gram: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
+                cross: [DMatrix::zeros(0, 0), DMatrix::zeros(0, 0)],
+            };
+            for axis in (0..2).filter(|axis| self.record.measured[*axis]) {
+                let mut responses = self.responses(at, plant, axis)?;
+                if axis_by_axis {
+                    responses.iter_mut().for_each(|response| *response = super::axis_by_axis(response));
                 }
-                Some(products)
-            })
-            .collect()
+                let count = responses.len();
+                let mut gram = DMatrix::zeros(count, count);
+                for left in 0..count {
+                    for right in 0..=left {
+                        let product = dot(&responses[left], &responses[right]);
+                        gram[(left, right)] = product;
+                        gram[(right, left)] = product;
+                    }
+                }
+                products.gram[axis] = gram;
+                products.cross[axis] = DMatrix::from_fn(columns.len(), count, |column, response| {
+                    dot(&columns[column][at * rows..][..rows], &responses[response])
+                });
+            }
+            Some(products)
+        });
+        products.into_iter().collect()
     }
 
     /// The plant at the start of each judged window, with what continues from window to window.

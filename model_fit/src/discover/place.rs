@@ -23,8 +23,8 @@ use super::super::select::{Fitted, SAME, effective};
 use super::features::{Term, group_terms, variables};
 use super::screen::{Screen, coefficient};
 use super::{ROWS, start};
+use crate::parallel;
 use model::{Model, Program};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::path::Path;
 
@@ -85,7 +85,7 @@ pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
     let rows: usize = baseline.fitting.records.iter().map(|record| record.time_s.len()).sum();
     groups.truncate((ROWS / rows.max(1)).clamp(FITTED[0], FITTED[1]));
     let fits: Vec<Option<(f64, f64)>> =
-        groups.par_iter().map(|group| refit((&with_terms, first), baseline, &screen, &group.terms)).collect();
+        parallel::map(&groups, |group| refit((&with_terms, first), baseline, &screen, &group.terms));
     for (group, fit) in groups.iter_mut().zip(&fits) {
         group.weigh(fit.map_or(group.share, |(share, _)| share), samples);
     }

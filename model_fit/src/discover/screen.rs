@@ -12,9 +12,9 @@
 
 use super::super::fit::{Fitting, UnknownId};
 use super::super::select::Fitted;
+use crate::parallel;
 use model::{Model, Program};
 use nalgebra::{DMatrix, DVector};
-use rayon::prelude::*;
 
 /// Terms that are simulated together.
 const CHUNK: usize = 25;
@@ -83,10 +83,9 @@ impl Screen {
             }
         }
         let all: Vec<usize> = (first..first + count).collect();
-        let columns: Vec<DMatrix<f64>> = all
-            .par_chunks(CHUNK)
-            .map(|chunk| responses(model, fitted, chunk, (&scale, residual.len())))
-            .collect();
+        let chunks: Vec<&[usize]> = all.chunks(CHUNK).collect();
+        let columns =
+            parallel::map(&chunks, |chunk| responses(model, fitted, chunk, (&scale, residual.len())));
         let mut terms = DMatrix::zeros(residual.len(), count);
         for (place, columns) in columns.iter().enumerate() {
             terms.columns_mut(place * CHUNK, columns.ncols()).copy_from(columns);
@@ -223,7 +222,7 @@ impl Screen {
                 information: slopes.tr_mul(&slopes),
             }
         };
-        (0..=self.blocks).into_par_iter().map(of_block).collect()
+        parallel::map_range(0..self.blocks + 1, of_block)
     }
 }
 
