@@ -32,24 +32,17 @@ fn every<T: Send>(
 ) -> T {
     let done = ProgressCounter(AtomicUsize::new(0));
     std::thread::scope(|scope| {
-        let (sender, receiver) = channel();
+        let (working, ended) = channel::<()>();
         let seen = &done;
         let worker = scope.spawn(move || {
-            // Only a receiver that waits no more does not take it.
-            let _ = sender.send(work(seen));
+            // Dropped when the work ends, by a panic too.
+            let _working = working;
+            work(seen)
         });
-        loop {
-            match receiver.recv_timeout(period) {
-                Ok(result) => return result,
-                Err(RecvTimeoutError::Timeout) => {
-                    progress(&format!("{what}: {} of {parts} done", done.0.load(Ordering::Relaxed)));
-                }
-                Err(RecvTimeoutError::Disconnected) => match worker.join() {
-                    Err(panic) => std::panic::resume_unwind(panic),
-                    Ok(()) => unreachable!("a worker that ends has sent its result"),
-                },
-            }
+        while ended.recv_timeout(period) == Err(RecvTimeoutError::Timeout) {
+            progress(&format!("{what}: {} of {parts} done", done.0.load(Ordering::Relaxed)));
         }
+        worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     })
 }
 
