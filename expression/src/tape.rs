@@ -301,18 +301,31 @@ impl Tape {
         let first = self.leaves.count() + self.constants.len() + which.start;
         let context =
             EvaluationContext { time_s: registers.values[0], inputs, history, curves: &self.curves };
-        for (place, operation) in self.operations[which.clone()].iter().enumerate() {
+        let Registers { values, slopes, width, active_operands, .. } = registers;
+        let width = *width;
+        let both = self.operations[which.clone()].iter().zip(&active_operands[which]);
+        for (result, (operation, active_operands)) in (first..).zip(both) {
             let operands = operation.operands.map(|operand| operand as usize);
-            let [a, b, c] = operands.map(|operand| registers.values[operand]);
-            let value = operation.code.value([a, b, c], &context);
-            registers.values[first + place] = value;
-            if let Some(active_operands) = registers.active_operands[which.start + place] {
-                let partial = operation.code.partials([a, b, c], value, active_operands, &context);
-                carry(registers, first + place, operands, active_operands, partial);
-                if let Code::DelayedLeaf(leaf) = operation.code {
-                    let slopes = registers.slope_mut((first + place) as Register);
-                    history.add_slopes(leaf, context.time_s - a, slopes);
+            let [a, b, c] = operands.map(|operand| values[operand]);
+            // Most are one of these, and choose once between all.
+            let (value, partial) = match operation.code {
+                Code::Add => (a + b, [1.0, 1.0, 0.0]),
+                Code::Subtract => (a - b, [1.0, -1.0, 0.0]),
+                Code::Multiply => (a * b, [b, a, 0.0]),
+                code => {
+                    let value = code.value([a, b, c], &context);
+                    let partial =
+                        active_operands.map(|wanted| code.partials([a, b, c], value, wanted, &context));
+                    (value, partial.unwrap_or_default())
                 }
+            };
+            values[result] = value;
+            let Some(active_operands) = active_operands else { continue };
+            carry((slopes, width), result, operands, *active_operands, partial);
+            if let Code::DelayedLeaf(leaf) = operation.code {
+                let slopes =
+                    &mut slopes[result * width..][..width].as_flattened_mut()[..registers.directions];
+                history.add_slopes(leaf, context.time_s - a, slopes);
             }
         }
     }
@@ -353,32 +366,37 @@ impl Tape {
 }
 
 /// Chain rule. An operand that was not taken has the factor 0, and its own derivative may be infinite: it is left out.
+#[inline]
 fn carry(
-    registers: &mut Registers,
+    (slopes, width): (&mut [[f64; LANES]], usize),
     result: usize,
     operands: [usize; 3],
     active_operands: ActiveOperands,
     partial: [f64; 3],
 ) {
-    let width = registers.width;
-    let (below, at) = registers.slopes.split_at_mut(result * width);
+    let (below, at) = slopes.split_at_mut(result * width);
     let target = &mut at[..width];
-    let mut is_first = true;
-    for (place, (operand, factor)) in operands.into_iter().zip(partial).enumerate() {
-        if factor == 0.0 || !active_operands[place] {
-            continue;
-        }
-        let source = &below[operand * width..][..width];
-        for (sum, slope) in target.iter_mut().zip(source) {
-            for lane in 0..LANES {
-                let product = factor * slope[lane];
-                sum[lane] = if is_first { product } else { sum[lane] + product };
+    let of = |operand: usize| &below[operand * width..][..width];
+    // A third operand is a choice's, which derives by one of its two values.
+    let [one, other, third] = [0, 1, 2].map(|place| active_operands[place] && partial[place] != 0.0);
+    let [by_one, by_other, by_third] = partial;
+    match (one, other) {
+        (true, true) => {
+            for ((sum, slope), other) in target.iter_mut().zip(of(operands[0])).zip(of(operands[1])) {
+                *sum = core::array::from_fn(|lane| by_one * slope[lane] + by_other * other[lane]);
             }
         }
-        is_first = false;
+        (true, false) => scale(target, of(operands[0]), by_one),
+        (false, true) => scale(target, of(operands[1]), by_other),
+        (false, false) if third => scale(target, of(operands[2]), by_third),
+        (false, false) => target.fill([0.0; LANES]),
     }
-    if is_first {
-        target.fill([0.0; LANES]);
+}
+
+#[inline]
+fn scale(target: &mut [[f64; LANES]], source: &[[f64; LANES]], factor: f64) {
+    for (sum, slope) in target.iter_mut().zip(source) {
+        *sum = slope.map(|slope| factor * slope);
     }
 }
 
