@@ -95,7 +95,7 @@ class Watch:
 
     def _age(self, frame_id: int) -> float:
         sample = self._seen.latest.get(frame_id)
-        return self._now_s() - (sample.time_s if sample else 0.0)
+        return self._now_s() - (sample[0] if sample else 0.0)
 
     def _count(self, frame_id: int) -> int:
         return self._seen.counts.get(frame_id, 0)

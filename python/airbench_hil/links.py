@@ -93,8 +93,8 @@ class Lockstep(Link):
         for law in self._laws:
             sample = latest.get(law.sensors_id)
             # Only sensors that came in this cycle are answered: lost ones are not.
-            if sample is not None and sample.time_s == self.now_s:
-                answer = law.answer(sample.word, _sampled(sample.word, self.cycle))
+            if sample is not None and sample[0] == self.now_s:
+                answer = law.answer(sample[1], _sampled(sample[1], self.cycle))
                 if answer is not None:
                     self.send(*answer)
                     self._seen.take(answer[0], answer[1], len(answer[1]), self.now_s)

@@ -9,7 +9,7 @@ from collections import deque
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import can
 import cantools.database
@@ -149,14 +149,9 @@ def _crc_table() -> tuple[int, ...]:
 _CRC = _crc_table()
 
 
-class Sample(NamedTuple):
-    """A frame as it is kept."""
-
-    time_s: float
-    """The rig's time, s."""
-    word: int
-    """Its data, little endian."""
-    length: int
+#: A frame as it is kept: the rig's time, s; its data, little endian; its length. The collector of garbage leaves plain tuples of
+#: numbers alone, and would visit each of these hundred thousands again and again were they a NamedTuple.
+Sample = tuple[float, int, int]
 
 
 class Seen:
@@ -170,7 +165,7 @@ class Seen:
 
     def take(self, raw_id: int, data: bytes, length: int, time_s: float) -> None:
         """A frame that came at this time, s."""
-        sample = Sample(time_s, int.from_bytes(data, "little"), length)
+        sample = time_s, int.from_bytes(data, "little"), length
         self.latest[raw_id] = sample
         kept = self.kept.get(raw_id)
         if kept is None:
@@ -182,7 +177,7 @@ class Seen:
     def value(self, signal: Signal) -> float | None:
         """Its newest value in its unit; None before its first frame."""
         sample = self.latest.get(signal.frame_id)
-        return None if sample is None else signal.of(sample.word)
+        return None if sample is None else signal.of(sample[1])
 
     def read(self, signal: Signal) -> float:
         """Its newest value in its unit.
@@ -197,13 +192,13 @@ class Seen:
     def course(self, signal: Signal, from_s: float, to_s: float) -> list[tuple[float, float]]:
         """Times, s, and values of what came between them, as far as it is kept."""
         kept = self.kept.get(signal.frame_id, ())
-        return [(each.time_s, signal.of(each.word)) for each in kept if from_s <= each.time_s <= to_s]
+        return [(time_s, signal.of(word)) for time_s, word, _ in kept if from_s <= time_s <= to_s]
 
     def messages(self, name: str | None, from_s: float, to_s: float) -> list[can.Message]:
         """Frames of that name, or all, that came between these times, s, in their order."""
         wanted = list(self.kept) if name is None else [self.names.message(name).frame_id]
-        came = ((each, frame_id) for frame_id in wanted for each in self.kept.get(frame_id, ()) if from_s <= each.time_s <= to_s)
-        return [_as_python_can(frame_id, each) for each, frame_id in sorted(came, key=lambda pair: (pair[0].time_s, pair[1]))]
+        came = ((each, frame_id) for frame_id in wanted for each in self.kept.get(frame_id, ()) if from_s <= each[0] <= to_s)
+        return [_as_python_can(frame_id, each) for each, frame_id in sorted(came, key=lambda pair: (pair[0][0], pair[1]))]
 
     def message(self, name: str) -> can.Message:
         """The newest frame of that name as python-can has it; its stamp is the rig's time, s.
@@ -218,9 +213,10 @@ class Seen:
 
 
 def _as_python_can(raw_id: int, sample: Sample) -> can.Message:
-    data = sample.word.to_bytes(8, "little")[: min(sample.length, 8)]
+    time_s, word, length = sample
+    data = word.to_bytes(8, "little")[: min(length, 8)]
     extended, remote = bool(raw_id & 0x80000000), bool(raw_id & 0x40000000)
     return can.Message(
-        timestamp=sample.time_s, arbitration_id=raw_id & 0x1FFFFFFF, data=b"" if remote else data, dlc=sample.length,
+        timestamp=time_s, arbitration_id=raw_id & 0x1FFFFFFF, data=b"" if remote else data, dlc=length,
         is_extended_id=extended, is_remote_frame=remote, is_error_frame=bool(raw_id & 0x20000000),
     )
