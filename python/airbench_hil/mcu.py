@@ -115,7 +115,7 @@ def main(words: list[str] | None = None, prog: str = "scripts/mcu") -> int:
             core.run_ns(1_000_000)
         core.check()
         core.said()
-        bus = peer.Peer(path)
+        bus = peer.Peer(path, stamped=False)
         bus.join(asked.name)
         joined = True
         _lockstep(core, bus, asked.boot_ms, sums)

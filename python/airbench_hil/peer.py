@@ -46,7 +46,7 @@ class Frame(NamedTuple):
     data: bytes
     length: int
     stamp_s: float = 0.0
-    """When it arrived: seconds since 1970, or of simulated time for a member of the barrier."""
+    """When it arrived: seconds since 1970, or of simulated time for a member of the barrier; 0 at a peer that is not `stamped`."""
 
 
 class Go(NamedTuple):
@@ -86,11 +86,13 @@ def check_name(name: str) -> bytes:
 class Peer:
     """A node of the bus. What it sends, it does not hear; all others do."""
 
-    def __init__(self, path: str, patience_s: float = 10.0) -> None:
-        """Connects, waiting `patience_s` for a host that is only just starting. Raises BusError."""
+    def __init__(self, path: str, patience_s: float = 10.0, *, stamped: bool = True) -> None:
+        """Connects, waiting `patience_s` for a host that is only just starting; to read frames without stamps takes half. Raises BusError."""
         self.path = path
         self.socket = self._connected(path, patience_s)
-        self.socket.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
+        self._stamped = stamped
+        if stamped:
+            self.socket.setsockopt(socket.SOL_SOCKET, _SO_TIMESTAMPNS, 1)
         self._poll = select.poll()
         self._poll.register(self.socket, select.POLLIN)
         self._writable = select.poll()
@@ -160,22 +162,30 @@ class Peer:
 
     def receive(self, timeout_s: float | None = None) -> Frame | Go | None:
         """The next Frame or Go; None when none comes in `timeout_s`. Raises BusError when the host is gone, LockstepTimeout."""
-        until = None if timeout_s is None else time.monotonic() + timeout_s
+        until = None
         while True:
             try:
                 # Packets come in groups: most of them wait already.
                 packet = self._packet()
             except BlockingIOError:
-                left = None if until is None else max(0.0, until - time.monotonic())
-                if not self._poll.poll(None if left is None else left * 1000):
+                if timeout_s is None:
+                    self._poll.poll()
+                    continue
+                if until is None:
+                    until = time.monotonic() + timeout_s
+                if not self._poll.poll(max(0.0, until - time.monotonic()) * 1000):
                     return None
                 continue
             if packet is not None:
                 return packet
 
     def _packet(self) -> Frame | Go | None:
+        ancillary: list[tuple[int, int, Any]] = []
         try:
-            bytes_, ancillary, _, _ = self.socket.recvmsg(_ROOM, 64, socket.MSG_DONTWAIT)
+            if self._stamped:
+                bytes_, ancillary, _, _ = self.socket.recvmsg(_ROOM, 64, socket.MSG_DONTWAIT)
+            else:
+                bytes_ = self.socket.recv(_ROOM, socket.MSG_DONTWAIT)
         except BlockingIOError:
             raise
         except OSError as error:
@@ -184,7 +194,7 @@ class Peer:
             raise BusError(f"the bus at {self.path} is closed")
         if len(bytes_) == _FRAME.size:
             raw_id, length, data = _FRAME.unpack(bytes_)
-            return Frame(raw_id, data[: min(length, 8)], length, _stamp_s(ancillary))
+            return Frame(raw_id, data if length >= 8 else data[:length], length, _stamp_s(ancillary) if self._stamped else 0.0)
         if len(bytes_) != _CONTROL.size or bytes_[:4] != _MAGIC:
             return None
         _, kind, members, cycle, name = _CONTROL.unpack(bytes_)

@@ -271,7 +271,7 @@ class Rig(Expectations, People):
 
     def _connect(self) -> None:
         laws = [Answering(each, self.names) for each in self.controllers if isinstance(each, Python)]
-        bus = peer.Peer(str(self.bus_path))
+        bus = peer.Peer(str(self.bus_path), stamped=False)
         try:
             if self.pace == "lockstep":
                 answer_s = _A_DAY_S if self._has_debugger() else self._answer_s
