@@ -26,6 +26,14 @@ def light_children():
     os.environ["PYTHONPATH"] = before or ""
 
 
+@pytest.fixture
+def asammdf():
+    """The package, in a session without it as well."""
+    if sys.modules.get("asammdf", pytest) is None:
+        del sys.modules["asammdf"]
+    return pytest.importorskip("asammdf")
+
+
 def emulator():
     """The program."""
     return Path(os.environ.get("AIRBENCH_BIN_DIR", ROOT / "target/release"), "emulator")

@@ -6,7 +6,7 @@ use std::process::Command;
 use system_tests::foreign_python::{light_path, of, tools_path};
 use system_tests::{Build, CompletedProcess, Program, Running, executable, firmware, turn, workspace};
 
-/// pytest in the environment of `python/`, with the programs as they ship.
+/// pytest in the environment of `python/`, with the programs as they ship. Tests that need asammdf bring it back.
 fn pytest() -> Command {
     let programs =
         [Program::Emulator, Program::Controller, Program::Bench, Program::Discrepancy, Program::Campaign];
@@ -16,7 +16,8 @@ fn pytest() -> Command {
     pytest.args(["-m", "pytest", "-v", "-p", "no:cacheprovider", "--color=no"]);
     pytest
         .env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder"))
-        .env("PATH", tools_path());
+        .env("PATH", tools_path())
+        .env("PYTHONPATH", workspace().join("python/tests/light"));
     pytest
 }
 

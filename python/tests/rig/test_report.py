@@ -76,6 +76,7 @@ def test_the_extended_model_runs_as_a_rig(report, tmp_path):
         assert rig.finish().figures["cycles"] == 100
 
 
+@pytest.mark.usefixtures("asammdf")
 def test_a_run_a_frame_and_an_mdf_are_the_same_record(runs, tmp_path):
     pandas = pytest.importorskip("pandas")
     run, _ = runs

@@ -407,8 +407,7 @@ def test_frames_go_in_and_out_as_python_can_and_cantools_have_them(tmp_path):
     assert len(mine) > 100 and mine == log[: len(mine)]
 
 
-def test_a_run_is_an_mdf_of_asammdf_with_units(tmp_path):
-    asammdf = pytest.importorskip("asammdf")
+def test_a_run_is_an_mdf_of_asammdf_with_units(asammdf, tmp_path):
     with Rig(controller=to_300_mm, setup=AT, seconds=0.2, out=tmp_path / "run") as rig:
         run = rig.finish()
     mdf = run.mdf()
