@@ -87,7 +87,7 @@ class Peer:
     """A node of the bus. What it sends, it does not hear; all others do."""
 
     def __init__(self, path: str, patience_s: float = 10.0, *, stamped: bool = True) -> None:
-        """Connects, waiting `patience_s` for a host that is only just starting; to read frames without stamps takes half. Raises BusError."""
+        """Connects, waiting `patience_s` for a host that is only just starting; without stamps, frames are read faster. Raises BusError."""
         self.path = path
         self.socket = self._connected(path, patience_s)
         self._stamped = stamped

@@ -17,7 +17,7 @@ fn pytest() -> Command {
     pytest
         .env("AIRBENCH_BIN", emulator.parent().expect("a program lies in a folder"))
         .env("PATH", tools_path())
-        .env("PYTHONPATH", workspace().join("python/tests/light"));
+        .env("PYTHONPATH", light_path());
     pytest
 }
 
