@@ -196,12 +196,13 @@ impl Trace {
         self.name("process_name", pid, 0, process.name)?;
         self.name("thread_name", pid, CYCLES, "cycles")?;
         self.name("thread_name", pid, WAKE_UPS, "wake-up: due to woke")?;
-        let mut previous_woke_ns = i128::MIN;
+        let (mut previous_woke_ns, mut drawn_to_ns) = (i128::MIN, i128::MIN);
         for row in &process.rows {
             let [due_ns, woke_ns, done_ns] =
                 [row.due_ns, row.woke_ns, row.done_ns].map(|ns| i128::from(ns) + offset_ns);
             let wake_up_us = microseconds(woke_ns - due_ns);
-            // Slices of a thread must not overlap: a row that was due before the previous wake-up begins there.
+            // Slices of a thread must not overlap. A row that was due before the previous wake-up waits from there on; a row
+            // that shares a wake-up with the previous row is drawn behind it.
             let waits_from_ns = due_ns.max(previous_woke_ns).min(woke_ns);
             previous_woke_ns = woke_ns;
             let args = json!({ "wake_up_us": wake_up_us });
@@ -211,11 +212,12 @@ impl Trace {
                 "run_delay_us": microseconds(i128::from(row.vitals.run_delay_ns)),
             });
             let name = format!("cycle {}", row.cycle);
-            self.add(&slice(&name, (pid, CYCLES), [woke_ns, done_ns], args))?;
+            let mut from_ns = woke_ns.max(drawn_to_ns);
+            drawn_to_ns = from_ns + done_ns - woke_ns;
+            self.add(&slice(&name, (pid, CYCLES), [from_ns, drawn_to_ns], args))?;
             let (receive, step, send) =
                 (("receive", row.receive_ns), ("step", row.step_ns), ("send", row.send_ns));
             let stages = if process.sends_first { [send, receive, step] } else { [receive, step, send] };
-            let mut from_ns = woke_ns;
             for (name, length_ns) in stages {
                 let to_ns = from_ns + i128::from(length_ns);
                 self.add(&slice(name, (pid, CYCLES), [from_ns, to_ns], Value::Null))?;
