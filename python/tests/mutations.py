@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "tests/firmware"
 SUITE = ROOT / "docs/examples/pytest/test_firmware.py"
 PAGE = ROOT / "docs/mistakes-on-purpose.md"
+PROGRAMS = ("firmware-embedded", "firmware-socketcan")
 BEGIN, END = "<!-- scripts/firmware-mutations --write -->\n", "<!-- end -->\n"
 
 
@@ -48,8 +49,8 @@ def codec(folder):
     return folder
 
 
-def build(folder, codec_folder, mutation=None):
-    """The firmware for the embedded bus, which the suite runs, in `folder`/build, changed or as it is, with the codec.
+def build(folder, codec_folder, mutation=None, programs=PROGRAMS[:1]):
+    """The firmware in `folder`/build, changed or as it is, with the codec; by default for the embedded bus alone.
 
     :raises ValueError: the text to be changed does not stand in its file exactly once.
     """
@@ -61,7 +62,7 @@ def build(folder, codec_folder, mutation=None):
             raise ValueError(f"{mutation.name}: what it changes stands {text.count(mutation.old)} times in {mutation.file}")
         (sources / mutation.file).write_text(text.replace(mutation.old, mutation.new))
     shutil.copytree(codec_folder, folder / "build")
-    _make(sources, folder / "build", folder / "build/firmware-embedded")
+    _make(sources, folder / "build", *(folder / "build" / program for program in programs))
     return folder / "build"
 
 
@@ -107,7 +108,7 @@ def main():
     for mutation in [None, *chosen]:
         with tempfile.TemporaryDirectory() as place:
             folder = Path(place)
-            outcomes = run(folder, build(folder, codec(folder / "codec"), mutation), "-n", "2")
+            outcomes = run(folder, build(folder, codec(folder / "codec"), mutation, PROGRAMS), "-n", "2")
         failed = [name for name, outcome in outcomes.items() if outcome != "passed"]
         good &= bool(failed) if mutation else not failed
         print(f"{mutation.name if mutation else 'unchanged'}: {', '.join(failed) or 'all tests passed'}", flush=True)
