@@ -1,7 +1,7 @@
 //! Calibration: baseline parameters without effects, with standard errors.
 //!
-//! Gauss-Newton over all factors, relinearised at each iterate. A parameter whose error is not clearly below its tolerance is not
-//! determined by the records.
+//! Gauss-Newton over all factors, relinearised at each iterate. A parameter whose error is not clearly below its prior standard
+//! deviation is not determined by the records.
 //!
 //! [`finer`] fits the numbers behind them, which the command `calibrate` reports as well.
 //!
@@ -16,7 +16,7 @@ use crate::refit::{Linearisation, Refit, refit, relinearise};
 use crate::report::Quantity;
 use model_fit::estimator::CALIBRATION;
 
-/// Share of the tolerance above which an error means that the records do not determine the parameter.
+/// Share of the prior standard deviation above which an error means that the records do not determine the parameter.
 const UNRESOLVED: f64 = 0.7;
 
 /// Fits the parameters without effects.

@@ -1,7 +1,7 @@
 //! The discrepancy term of a model: an unknown input that is a function of state and command, the same in all windows.
 //!
 //! ```text
-//!   e = J a + B Phi_g w + noise       J sensitivities of parameters and effects, a with their priors
+//!   e = S a + B Phi_g w + noise       S sensitivities of parameters and effects, a with their priors
 //!                                     B responses to unknown inputs by block, Phi_g hats over the variable of group g
 //!   w ~ N(0, s^2)                     size s on a grid; ln Z_g = -1/2 (L + n ln s^2 + ln |H|), best s
 //! ```

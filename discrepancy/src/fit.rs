@@ -1,7 +1,8 @@
 //! Robust least squares of columns over windows.
 //!
 //! ```text
-//!   minimise  sum_k f_k ln(|e_k - C_k a|^2 / f_k) + sum_j (a_j / tolerance_j)^2         window k, f_k degrees of freedom
+//!   minimise  sum_k f_k ln(|e_k - C_k a|^2 / f_k) + sum_j ((a_j - m_j) / s_j)^2         window k, f_k degrees of freedom
+//!                                                                                    m_j, s_j  prior mean, standard deviation
 //! ```
 //!
 //! The first sum is, up to a constant, minus twice the profile log-likelihood of Gaussian windows of unknown variance; its null
@@ -170,7 +171,7 @@ impl Products {
             .collect()
     }
 
-    /// Weighted normal equations of some columns, with ridges 1 / tolerance^2.
+    /// Weighted normal equations of some columns, with ridges 1 / s_j^2.
     pub(crate) fn normal(
         &self,
         chosen: &[usize],

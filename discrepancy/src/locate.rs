@@ -1,7 +1,7 @@
 //! Where the baseline and the records disagree: unknown inputs of every balance, window by window.
 //!
 //! ```text
-//!   course ──► windows of 20 ms ──► unknown force, flows, sensor offset ──► bars, regimes, maps, series
+//!   record ──► windows of 20 ms ──► unknown force, flows, sensor offset ──► bars, regimes, maps, series
 //! ```
 //!
 //! A balance is closed when its unknown input is as large as its propagated noise. Otherwise a term is missing, and its

@@ -107,8 +107,8 @@ pub struct SelectionResult {
     /// 99th percentile of the largest gain of any candidate under the null distribution.
     pub(crate) threshold: f64,
     pub columns: Columns,
-    /// Null loss: parameters alone, linearised.
-    pub(crate) null_loss: f64,
+    /// Loss of the parameters alone, linearised.
+    pub(crate) calibrated_loss: f64,
     /// Detection limit of each candidate as a coordinate of its amplitude; `None` where the record does not excite it.
     pub limits: Vec<Option<f64>>,
     /// Whether the model leaves more than noise on the searched part of the records.
@@ -121,7 +121,7 @@ pub struct SelectionResult {
     pub not_explained: Option<NotExplained>,
     /// Whether each effect of the model has a name.
     pub is_named: Vec<bool>,
-    /// What was compared, nothing first.
+    /// Explanations compared, the null model first.
     pub explanations: Vec<Explanation>,
     /// Of the set that is named, or would be.
     pub significance: Option<Significance>,
@@ -139,7 +139,7 @@ pub fn name(
     progress(&format!("screening {} candidates", candidates.len()));
     let columns = Columns::new(engine, candidates);
     let baseline = engine.residual(&engine.simulate(&engine.rig));
-    let (null_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
+    let (calibrated_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
     let RefitWithInitialStates { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated);
@@ -150,8 +150,11 @@ pub fn name(
     for number in 0..MAX_EFFECTS {
         let here = restarted.as_ref().unwrap_or(engine);
         let model = &selection.model;
-        let screening =
-            if number == 0 { (null_loss, screened.clone()) } else { screen_again(here, &columns, model) };
+        let screening = if number == 0 {
+            (calibrated_loss, screened.clone())
+        } else {
+            screen_again(here, &columns, model)
+        };
         let at_model = if number == 0 { linearisation.clone() } else { linearise(here, model) };
         // What is left where a model lacks fit is signal: it is no measure of what chance gains.
         let searched = if lacks_fit(here, model.loss) { 0.0 } else { threshold };
@@ -249,7 +252,7 @@ pub fn name(
         fitted,
         threshold,
         columns,
-        null_loss,
+        calibrated_loss,
         limits,
         lacks_fit,
         heterogeneity,

@@ -80,13 +80,13 @@ impl Columns {
         let all = self.with_model(linearisation, model_sensitivities);
         let joint = JointColumns::new(linearisation, model_sensitivities.len());
         let products = engine.products(residual, &all);
-        let null_loss = joint.fit(&products).loss;
+        let loss_before = joint.fit(&products).loss;
         let screened = parallel::map_range(0..self.candidates.len(), |at| {
             let BestColumns { loss, coordinates, .. } = self.best_columns(&products, at, &joint)?;
             let start = EffectEstimate { candidate: self.candidates[at], coordinates };
             Some(ScreenedCandidate { at, loss, start })
         });
-        (null_loss, screened.into_iter().flatten().collect())
+        (loss_before, screened.into_iter().flatten().collect())
     }
 
     /// All columns: of the parameters, of a model, of the probes.

@@ -1,14 +1,15 @@
-//! Standard errors beside a law that is only near: by leaving out one block of time after the other, and by what naming it moved.
+//! Standard errors with autocorrelated residuals and an approximate (misspecified) law.
 //!
 //! ```text
-//!   e_i^2 = (B - 1)/B sum over blocks b of (theta_(b),i - mean)^2        delete-one-block jackknife
+//!   error^2 = max(s^2 n / n_eff, e_b^2) + e_law^2                      s of the model, n_eff the effective sample size
+//!   e_b^2 = (B - 1)/B sum over blocks b of (theta_(b) - mean)^2        delete-one-block jackknife
 //! ```
-//! theta_(b): the fit without block b, by one linear step. Where the law is only near, blocks that visit other places ask for
-//! other numbers, and their spread is in e. A misfit that is the same in every block is not.
+//! theta_(b): the fit without block b, by one linear step. Where the law is approximate, the estimate differs between blocks that
+//! visit other places, and that spread is in e_b. A misfit that is the same in every block is not.
 //!
 //! ```text
-//!   number of the law          e = LAW |theta|                     the law's form is known to a share LAW of its size
-//!   other number               e = LAW |theta - theta_0|           theta_0: fitted without the law
+//!   number of the law          e_law = LAW |theta|                 the law's form is known to a share LAW of its size
+//!   other number               e_law = LAW |theta - theta_0|       theta_0: fitted without the law
 //! ```
 //! A part of the law's effect that has another form than the law is left to the other numbers, without a trace in the residual;
 //! what the whole law takes from them is theta - theta_0. LAW is a declared size of the model error, of the kind of a
@@ -23,7 +24,7 @@ use super::normal::{correlations, standard_errors};
 use super::select::Fitted;
 use nalgebra::{DMatrix, DVector};
 
-/// Error of a number, SI: by the records, and by a law that is only near.
+/// Error of a number, SI: by the records, and by an approximate law.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NumberError {
     of_records: f64,
@@ -36,8 +37,8 @@ impl NumberError {
     }
 }
 
-/// Errors of the numbers of a fit: the larger of what a coloured residual is worth and of the jackknife over blocks of time, and
-/// beside it, where a law was named, what one that is only near leaves to them. `None` for one that the records do not determine.
+/// Errors of the numbers of a fit: the larger of the model-based error, inflated for autocorrelation, and the jackknife's. Where
+/// a law was named, its model error is added in quadrature. `None` for a number that the records do not determine.
 pub(super) fn errors(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool) -> Vec<Option<NumberError>> {
     let fitting = &fitted.fitting;
     let counts: f64 = (0..fitted.effective.len()).map(|output| fitting.count(output)).sum();

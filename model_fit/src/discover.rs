@@ -168,16 +168,16 @@ fn round<'a>(
         .iter()
         .map(|(suspect, fit)| judge(found.reference_fits(), fit, *suspect, (terms.len(), &effective)))
         .collect();
-    let most = judged.iter().map(Evaluation::worth).fold(f64::NEG_INFINITY, f64::max);
+    let most = judged.iter().map(Evaluation::bic_gain).fold(f64::NEG_INFINITY, f64::max);
     // Of those that are as good the simplest.
-    let is_as_good = |place: &usize| judged[*place].worth() > most - SAME;
+    let is_as_good = |place: &usize| judged[*place].bic_gain() > most - SAME;
     let place = (0..judged.len())
         .filter(is_as_good)
         .min_by_key(|place| terms[judged[*place].suspect - first].complexity)?;
     let chosen = judged[place].clone();
     let form = |evaluation: &Evaluation| terms[evaluation.suspect - first].form();
     let others = judged.iter().filter(|other| other.passes && form(other) != form(&chosen));
-    let alternatives = others.filter(|other| chosen.worth() - other.worth() <= GAIN_APART);
+    let alternatives = others.filter(|other| chosen.bic_gain() - other.bic_gain() <= GAIN_APART);
     let alternatives = alternatives.map(|other| other.suspect).collect();
     Some((fits.swap_remove(place).1, chosen, alternatives))
 }

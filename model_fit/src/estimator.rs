@@ -9,9 +9,10 @@
 //! ```
 //!
 //! Backtracking on the simulated loss (fits of model files damp a step in place of shortening it, see `fit`): a step counts only
-//! if the loss of the simulator falls, not that of the linearised model. Callers know how to linearise and which fits are linear
-//! within a step (of the rig, `refit` takes the baseline parameters as linear, `name` and `tabulate` simulate them). Through
-//! stick-slip the loss has steps, so that neither the slope nor a sufficient decrease is asked for.
+//! if the loss of the simulator falls, not that of the linearised model (but for `calibrate::finer` of `discrepancy`). Callers
+//! know how to linearise and which fits are linear within a step (of the rig, `refit` takes the baseline parameters as linear,
+//! `name` and `tabulate` simulate them). Through stick-slip the loss has steps, so that neither the slope nor a sufficient
+//! decrease is asked for.
 //!
 //! Source: Björck, Numerical Methods for Least Squares Problems, SIAM 1996, chapter 9 (damped Gauss-Newton, variable projection).
 

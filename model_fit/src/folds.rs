@@ -1,4 +1,4 @@
-//! Folds: what blocks of a record leave under the fit without them, from normal equations alone.
+//! Leave-one-block-out cross-validation: residuals of each block under the fit without it, from normal equations alone.
 //!
 //! ```text
 //!   shared numbers:       the step without the block, within their ranges       (N - N_b) d = g - g_b

@@ -4,7 +4,7 @@
 //!
 //! | gate | asks | against |
 //! |---|---|---|
-//! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n is what the residual of the best fit is worth |
+//! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n: effective sample size of the best fit's residual |
 //! | folds in time | at least a tenth of the power that the model leaves | size |
 //! | folds in time | 5 standard errors over folds, or half of the power | an error of the model that no suspect describes |
 //! | folds in time | a gain without the block that gains most, too | an event that is none of the plant's |
@@ -35,8 +35,8 @@ const T_SMALL: f64 = 5.0;
 const T_BANDS: f64 = 2.0;
 /// Standard errors over folds of a difference between two suspects that tells them apart.
 const T_APART: f64 = 3.0;
-/// Difference of [`Evaluation::worth`] (twice the log likelihood, less the penalty) that does the same. "Very strong" is 10 for
-/// twice the log Bayes factor [Kass, Raftery 1995, JASA 90(430)].
+/// Difference of [`Evaluation::bic_gain`] (twice the log likelihood, less the penalty) that does the same. "Very strong" is 10
+/// for twice the log Bayes factor [Kass, Raftery 1995, JASA 90(430)].
 pub(super) const GAIN_APART: f64 = 10.0;
 
 /// How a suspect did in a round.
@@ -188,8 +188,8 @@ fn judge_by_folds(
 }
 
 impl Evaluation {
-    /// Twice a log likelihood ratio, less what chance is granted.
-    pub(super) fn worth(&self) -> f64 {
+    /// Twice a log likelihood ratio, less the penalty of the extended BIC.
+    pub(super) fn bic_gain(&self) -> f64 {
         self.gain - self.penalty
     }
 }
@@ -197,11 +197,11 @@ impl Evaluation {
 /// Probabilities of a round: each suspect, all as likely before, and none of them, as likely before as all together, since a
 /// penalty has 2 ln(suspects tried); gains in units of the best one's samples.
 pub(super) fn weigh(round: &mut [Evaluation]) {
-    let best = round.iter().map(Evaluation::worth).fold(0.0, f64::max);
-    let weight = |worth: f64| (0.5 * (worth - best)).exp();
-    let sum: f64 = weight(0.0) + round.iter().map(|one| weight(one.worth())).sum::<f64>();
+    let best = round.iter().map(Evaluation::bic_gain).fold(0.0, f64::max);
+    let weight = |gain: f64| (0.5 * (gain - best)).exp();
+    let sum: f64 = weight(0.0) + round.iter().map(|one| weight(one.bic_gain())).sum::<f64>();
     for one in round {
-        one.probability = weight(one.worth()) / sum;
+        one.probability = weight(one.bic_gain()) / sum;
     }
 }
 
@@ -237,7 +237,7 @@ pub(super) fn is_one_effect(model: &Model, one: usize, other: usize) -> bool {
 /// Whether one is better than the other beyond doubt: by its likelihood, or on the same folds. Forms of one effect differ by so
 /// little that the spread over folds is nothing to compare it with: of them the likelihood decides alone.
 pub(super) fn apart(model: &Model, best: &Evaluation, other: &Evaluation) -> bool {
-    if best.worth() - other.worth() > GAIN_APART {
+    if best.bic_gain() - other.bic_gain() > GAIN_APART {
         return true;
     }
     if is_one_effect(model, best.suspect, other.suspect) {

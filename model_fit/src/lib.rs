@@ -17,9 +17,9 @@
 //! | `simulate` | the model with the values of its file beside a record |
 //! | `samples` | measured samples, what the model says of them, derivatives |
 //! | `normal` | normal equations, steps, standard errors |
-//! | `covariance` | standard errors beside coloured residuals and a law that is only near |
+//! | `covariance` | standard errors with autocorrelated residuals and an approximate law |
 //! | `cuts` | rows in blocks of time, and in bands |
-//! | `folds` | what a block leaves under the fit without it |
+//! | `folds` | leave-one-block-out cross-validation |
 //! | `starts` | from where a fit starts |
 //! | `select` | which suspects are taken |
 //! | `judge` | whether a suspect passes |

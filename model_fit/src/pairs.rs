@@ -56,7 +56,7 @@ pub(super) fn best<'a>(
 /// A pair as it was fitted, and how it is judged.
 struct JudgedPair<'a> {
     fit: Fitted<'a>,
-    worth: f64,
+    bic_gain: f64,
     members: [Evaluation; 2],
     /// The gate that it fails.
     fails: Option<String>,
@@ -91,7 +91,7 @@ fn fitted_pairs<'a>(
         let gates = [(&whole, "the two"), (&members[0], "the first"), (&members[1], "the second")];
         let failed = gates.into_iter().find(|(one, _)| !one.passes);
         let fails = failed.map(|(one, which)| format!("{which}: {}", one.gate));
-        Some(JudgedPair { fit, worth: whole.worth(), members, fails })
+        Some(JudgedPair { fit, bic_gain: whole.bic_gain(), members, fails })
     });
     Some(judged.collect())
 }
@@ -101,7 +101,7 @@ fn chosen<'a, 'n>(
     name: impl Fn(usize) -> &'n String,
 ) -> Result<Pair<'a>, Option<String>> {
     let mut judged = judged.unwrap_or_default();
-    judged.sort_by(|one, other| other.worth.total_cmp(&one.worth));
+    judged.sort_by(|one, other| other.bic_gain.total_cmp(&one.bic_gain));
     let pair_of = |one: &JudgedPair<'_>| [0, 1].map(|place| one.members[place].suspect);
     let Some(best) = judged.iter().position(|one| one.fails.is_none()) else {
         let nearest = judged.first().map(|nearest| {
@@ -113,7 +113,7 @@ fn chosen<'a, 'n>(
     };
     let best = judged.swap_remove(best);
     let is_as_good =
-        |other: &&JudgedPair<'_>| other.fails.is_none() && best.worth - other.worth <= GAIN_APART;
+        |other: &&JudgedPair<'_>| other.fails.is_none() && best.bic_gain - other.bic_gain <= GAIN_APART;
     let others: Vec<[usize; 2]> = judged.iter().filter(is_as_good).map(pair_of).collect();
     let pair = pair_of(&best);
     let alternatives = |mine: usize| {

@@ -24,7 +24,7 @@ use std::sync::OnceLock;
 
 /// Most terms that are taken.
 pub(super) const MOST_TERMS: usize = 3;
-/// Difference of [`Evaluation::worth`] below which forms of one effect count as equally good.
+/// Difference of [`Evaluation::bic_gain`] below which forms of one effect count as equally good.
 pub(super) const SAME: f64 = 2.0;
 
 /// A fitted model with its folds, its normal equations, and the effective size of its samples.
@@ -46,7 +46,7 @@ pub(crate) struct Fitted<'a> {
     pub(super) judged: Vec<f64>,
     /// Normal equations at the point.
     pub(crate) normal: Normal,
-    /// Independent samples that each output's residual is worth.
+    /// Effective sample size of each output's residual.
     pub(crate) effective: Vec<f64>,
 }
 
@@ -146,7 +146,7 @@ pub(crate) fn search<'a>(
         }
         found.last.clone_from(&round);
         let passing = (0..round.len()).filter(|place| round[*place].passes);
-        let value = |place: usize| round[place].worth();
+        let value = |place: usize| round[place].bic_gain();
         let best = passing.clone().max_by(|a, b| value(*a).total_cmp(&value(*b)));
         if best.is_none() && found.accepted.is_empty() {
             let alone: Vec<(usize, Fitted<'a>)> = tried.into_iter().zip(fits).collect();
@@ -177,7 +177,7 @@ pub(crate) fn search<'a>(
         let is_near = |other: &&Evaluation| {
             other.suspect != evaluation.suspect
                 && !model.suspects[other.suspect].is_decoy
-                && (other.passes || other.worth() > 0.0)
+                && (other.passes || other.bic_gain() > 0.0)
                 && !apart(model, &evaluation, other)
         };
         let (alternatives, near): (Vec<&Evaluation>, Vec<&Evaluation>) =
@@ -318,7 +318,7 @@ pub(crate) fn fitted_from<'a>(
     })
 }
 
-/// What the residual of each output is worth in independent samples.
+/// Effective sample size of the residual of each output.
 pub(super) fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> {
     let residuals = series(fitting, point)?;
     let of_output =

@@ -38,7 +38,7 @@ impl Products {
         Some(&inverse * middle * &inverse)
     }
 
-    /// For one column, with all others projected out: the change of its coefficient that each window asks for, and its
+    /// For one column, with all others projected out: the one-step estimate of its change from each window alone, and its
     /// information there. `None` where the others are singular.
     pub(crate) fn window_changes(
         &self,

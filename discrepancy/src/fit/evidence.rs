@@ -2,15 +2,15 @@
 //! integrated out.
 //!
 //! ```text
-//!   e = J a + D z + M B w + noise       J, D sensitivities of parameters and effects, a with prior N(0, 1/P), z heavy-tailed
+//!   e = S a + D z + M B w + noise       S, D sensitivities of parameters and effects, a with prior N(0, 1/P), z heavy-tailed
 //!                                       B responses to unknown inputs by block, w ~ N(0, size^2 C) in each window
-//!   M = 1 - J (J'WJ)^-1 J'W             W window weights f_k / q_k: the term holds nothing that parameters can do
+//!   M = 1 - S (S'WS)^-1 S'W             W window weights f_k / q_k: the term holds nothing that parameters can do
 //!   ln p(e) = - power/2 (sum_k f_k ln(q_k / f_k) + ln |1 + size^2 B C B'|) - 1/2 ln |H|
 //!             - 1/2 u' N u + 1/2 ln |N| + ln p(z) + n/2 ln 2 pi
-//!   q_k = e' (1 + size^2 B C B')^-1 e   of what is left      u  estimate of a without the term      N^-1 = 1/P + (power J'WJ)^-1
+//!   q_k = e' (1 + size^2 B C B')^-1 e   of what is left      u  estimate of a without the term      N^-1 = 1/P + (power S'WS)^-1
 //! ```
 //!
-//! What parameters cannot do has the restricted likelihood (REML) of e: projecting J out of B changes nothing there. What they
+//! What parameters cannot do has the restricted likelihood (REML) of e: projecting S out of B changes nothing there. What they
 //! can do has the normal density of u, in which no term takes part. H is the Hessian in a (no prior) and z (Gauss-Newton, and the
 //! prior's weight in a fit), at the mode in z (Laplace). The likelihood is raised to `power`; priors are not.
 //!
@@ -40,13 +40,13 @@ const NODES: [(f64, f64); 9] = [
     (0.968_160_239_507_626_1, 0.081_274_388_361_574_4),
 ];
 
-/// Size and memory of the unknown inputs of a window.
+/// Standard deviation and correlation length of the unknown inputs of a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Covariance {
     /// Standard deviation of an input, N or Nl/min.
     pub(crate) size: f64,
     /// Blocks after which the correlation has fallen to 1/e; 0 for independent blocks.
-    pub(crate) memory_blocks: f64,
+    pub(crate) correlation_blocks: f64,
 }
 
 /// Unknown inputs of all windows, beside the residuals and columns of several models.
@@ -69,14 +69,15 @@ pub(crate) struct IntegratedInputs {
 }
 
 impl InputGrams {
-    /// Integrates the inputs out for each size of one memory; a size is left out where rounding leaves no positive matrix.
-    pub(crate) fn integrated(&self, memory_blocks: f64, sizes: &[f64]) -> Vec<IntegratedInputs> {
-        let root = self.root(memory_blocks);
+    /// Integrates the inputs out for each size with one correlation length; a size is left out where rounding leaves no positive
+    /// matrix.
+    pub(crate) fn integrated(&self, correlation_blocks: f64, sizes: &[f64]) -> Vec<IntegratedInputs> {
+        let root = self.root(correlation_blocks);
         let transformed: Vec<(DMatrix<f64>, DMatrix<f64>)> = (self.gram.iter().zip(&self.cross))
             .map(|(gram, cross)| (root.transpose() * gram * &root, root.transpose() * cross))
             .collect();
         let of_size = |size: f64| {
-            let covariance = Covariance { size, memory_blocks };
+            let covariance = Covariance { size, correlation_blocks };
             let mut integrated =
                 IntegratedInputs { covariance, log_determinant: 0.0, reductions: Vec::new() };
             for (gram, cross) in &transformed {
@@ -94,13 +95,15 @@ impl InputGrams {
     }
 
     /// A root of the correlation matrix of a window's inputs.
-    fn root(&self, memory_blocks: f64) -> DMatrix<f64> {
+    fn root(&self, correlation_blocks: f64) -> DMatrix<f64> {
         let inputs = self.gram.first().map_or(0, DMatrix::nrows);
         let correlation = DMatrix::from_fn(inputs, inputs, |row, column| {
             let same_kind = row / self.blocks == column / self.blocks;
             match row.abs_diff(column) {
                 0 => 1.0,
-                apart if same_kind && memory_blocks > 0.0 => (-(apart as f64) / memory_blocks).exp(),
+                apart if same_kind && correlation_blocks > 0.0 => {
+                    (-(apart as f64) / correlation_blocks).exp()
+                }
                 _ => 0.0,
             }
         });
@@ -111,7 +114,7 @@ impl InputGrams {
 impl IntegratedInputs {
     /// Without a term.
     pub(crate) fn none(windows: usize) -> Self {
-        let covariance = Covariance { size: 0.0, memory_blocks: 0.0 };
+        let covariance = Covariance { size: 0.0, correlation_blocks: 0.0 };
         IntegratedInputs { covariance, log_determinant: 0.0, reductions: vec![DMatrix::zeros(0, 0); windows] }
     }
 
@@ -296,7 +299,7 @@ mod tests {
     use statrs::distribution::{ContinuousCDF, Normal};
 
     const ROWS: usize = 60;
-    const TERM: Covariance = Covariance { size: 0.7, memory_blocks: 2.0 };
+    const TERM: Covariance = Covariance { size: 0.7, correlation_blocks: 2.0 };
     /// With so many degrees of freedom Student's t is normal.
     const NORMAL: f64 = 1e9;
     const PRIOR_PRECISIONS: [f64; 2] = [1.5, 0.4];
@@ -342,7 +345,7 @@ mod tests {
                 gram: vec![self.inputs.transpose() * &self.inputs],
                 cross: vec![self.inputs.transpose() * DMatrix::from_columns(&all)],
             };
-            grams.integrated(TERM.memory_blocks, &[TERM.size]).remove(0)
+            grams.integrated(TERM.correlation_blocks, &[TERM.size]).remove(0)
         }
 
         fn by_laplace(&self, prior: HeavyTailed) -> f64 {
@@ -380,7 +383,7 @@ mod tests {
                 - &parameters * normal.try_inverse().unwrap() * parameters.transpose() * &self.inputs;
             let correlation = DMatrix::from_fn(6, 6, |row: usize, column| {
                 let apart = row.abs_diff(column) as f64;
-                if row / 3 == column / 3 { (-apart / TERM.memory_blocks).exp() } else { 0.0 }
+                if row / 3 == column / 3 { (-apart / TERM.correlation_blocks).exp() } else { 0.0 }
             });
             let of_term = |inputs: &DMatrix<f64>| {
                 DMatrix::identity(ROWS, ROWS) + TERM.size.powi(2) * inputs * &correlation * inputs.transpose()

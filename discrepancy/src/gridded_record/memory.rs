@@ -1,4 +1,4 @@
-//! What an axis remembers: values of a period that depend on the periods before it.
+//! History variables of an axis: low-pass and play (hysteresis) states of recorded signals.
 //!
 //! ```text
 //!   low pass     y' = (x - y)/T                                 change = x - y: what x did in the last T

@@ -2,19 +2,20 @@
 //!
 //! ```text
 //!   probability of one half and more                 the model of the search leaves more than noise      noise alone
-//!   a set of effects within the bar                  that set, with "more is missing"                    the model of the search
-//!   a set of effects beyond the bar, none of these   outside the catalogue                               the model of the search
+//!   a homogeneous set of effects                     that set, with "more is missing"                    the model of the search
+//!   a heterogeneous set of effects, none of these    outside the catalogue                               the model of the search
 //!   parameters, or no explanation                    the model of the search, unless it explains         the model of the search
 //!                                                    too little: then outside the catalogue
-//!   nothing                                          outside the catalogue                               parameters, if adequate
+//!   the null model                                   outside the catalogue                               parameters, if adequate
 //! ```
 //!
-//! The bar: the amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; by [`MAX_CV_OF_PART`], beside at most
-//! [`MAX_PARAMETERS_MOVED`] parameters that are moved, where the model of the search leaves more than noise, and the set more
-//! than [`MOST_LOSS_LEFT`] of the loss. The model of the search has no name either where more than [`MAX_SIGNIFICANTLY_OFF`]
-//! parameters are significantly off beside it, unless an effect of it joined as a homogeneous one, or where its set is less
-//! probable than nothing or than [`LEAST_PROBABLE`]: so it is wherever nothing has one half; parameters that are not adequate
-//! (leave more than noise) are outside the catalogue. A set whose variation cannot be computed is beyond the bar.
+//! A set is homogeneous where its amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; by [`MAX_CV_OF_PART`],
+//! beside at most [`MAX_PARAMETERS_MOVED`] parameters that are moved, where the model of the search leaves more than noise, and
+//! the set more than [`MOST_LOSS_LEFT`] of the loss. The model of the search has no name either where more than
+//! [`MAX_SIGNIFICANTLY_OFF`] parameters are significantly off beside it, unless an effect of it joined as a homogeneous one, or
+//! where its set is less probable than the null model (`nothing`) or than [`LEAST_PROBABLE`], which holds wherever the null model
+//! has one half; parameters that are not adequate (leave more than noise) are outside the catalogue. A set whose variation cannot
+//! be computed counts as heterogeneous.
 
 use super::elimination::{Selection, has_effect, is_same_set};
 use super::explanations::Explanation;
@@ -47,7 +48,7 @@ const MOST_LOSS_LEFT: f64 = 0.5;
 /// Share of the excess that a name beside effects without one needs: on seed 13 hidden effects took 0.11 to 0.86 of it, and
 /// effects named where only a background was hidden 0.04 to 0.12.
 const MIN_SHARE_BESIDE_SMALL: f64 = 0.2;
-/// Most baseline parameters that may be significantly off beside an effect: with more, it is an impostor that they carry.
+/// Most baseline parameters that may be significantly off beside an effect: with more, it is a spurious effect that they carry.
 /// Chosen on draws of seed 4, a development seed.
 const MAX_SIGNIFICANTLY_OFF: usize = 3;
 /// Most parameters moved, by the soft count `parameters_moved` of the features, beside a set that leaves more than
@@ -199,7 +200,7 @@ fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
     significantly_off(engine, &model.widened(&spread)).into_iter().filter(|is_off| *is_off).count()
 }
 
-/// Whether the effects of the search's model are less probable than nothing, or hardly probable at all.
+/// Whether the effects of the search's model are less probable than the null model or than [`LEAST_PROBABLE`].
 fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
     let large: Vec<_> = model.effects.iter().filter(|effect| is_large(effect)).collect();
     let null = explanations.iter().find(|one| one.kind == ExplanationKind::Null);

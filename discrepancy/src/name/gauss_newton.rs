@@ -4,6 +4,10 @@
 //!   effects and needed parameters ──► Gauss-Newton step ──► accepted only when the simulated loss falls
 //! ```
 //!
+//! Of two steps, one from all windows and one without outlying windows, the better is taken. Where a full step raises the loss,
+//! windows whose squares exceed the linearised prediction by [`NONLINEAR_EXCESS`] are excluded from it and it is computed again;
+//! it is shortened where no further window is excluded. The loss of a step is that of all windows.
+//!
 //! Forward selection moves the parameters on the linearised model, which suffices to compare models. The final numbers come from
 //! the simulator.
 

@@ -1,7 +1,7 @@
 //! Heterogeneity of an effect's amplitude between the windows of the records.
 //!
 //! ```text
-//!   d_k, i_k   change of the effect that window k asks for beside the fitted model, as a share of it, and its information
+//!   d_k, i_k   estimate of the effect's change from window k alone (one step), as a share of its amplitude, and its information
 //!   Q = sum_k i_k (d_k - mean)^2     tau^2 = (Q - (n - 1)) / (sum i - sum i^2 / sum i), at least 0     CV_B = tau
 //! ```
 //!

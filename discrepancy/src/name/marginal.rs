@@ -2,7 +2,7 @@
 //! the deciding one (`probabilities.rs`) and decides nothing.
 //!
 //! ```text
-//!   Z_j = sum over sizes and memories of the term:  prior of both, times p(e | j, size, memory)        (fit/evidence.rs)
+//!   Z_j = sum over sizes and correlation lengths of the term:  prior of both, times p(e | j, size, length)     (fit/evidence.rs)
 //!   probability_j = prior_j Z_j / sum_k prior_k Z_k
 //! ```
 //!
@@ -40,8 +40,8 @@ use priors::{prior_of, prior_of_coordinate, prior_of_terms, scaled};
 const POWER: f64 = 0.004;
 /// Sizes of the term beside none, N and Nl/min: half a decade apart, from what no sensor shows to more than is drawn.
 const SIZES: [f64; 7] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0];
-/// Memories of the term, in blocks of 20 ms: a quarter of a window, and so long that it hardly changes in one.
-const MEMORIES: [f64; 2] = [5.0, 50.0];
+/// Correlation lengths of the term, in blocks of 20 ms: a quarter of a window, and so long that it hardly changes in one.
+const CORRELATION_BLOCKS: [f64; 2] = [5.0, 50.0];
 /// Factors on the scale of the amplitude priors; the first is that of the probability, all make its range.
 const SCALE_FACTORS: [f64; 3] = [1.0, 1.0 / 3.0, 3.0];
 /// Posterior standard deviations from a bound below which an amplitude is integrated by quadrature, and those on either side of
@@ -82,9 +82,9 @@ fn marginals(
     });
     let models: Vec<Model<'_>> = models.into_iter().collect::<Option<_>>()?;
     let (grams, places) = inputs(engine, &sensitivities, &models)?;
-    let of_memory = |memory: &f64| grams.integrated(*memory, &SIZES);
+    let of_length = |blocks: &f64| grams.integrated(*blocks, &SIZES);
     let mut terms = vec![IntegratedInputs::none(grams.gram.len())];
-    terms.extend(parallel::map(&MEMORIES, of_memory).into_iter().flatten());
+    terms.extend(parallel::map(&CORRELATION_BLOCKS, of_length).into_iter().flatten());
     // A term under which a model has no mode adds nothing.
     let of_model = |at: usize| -> Vec<[f64; 3]> {
         let log = |term| models[at].log_likelihoods(term, &places[at]).unwrap_or([f64::NEG_INFINITY; 3]);

@@ -57,8 +57,8 @@ fn integration_shifts(engine: &Engine<'_>, model: &Refit) -> Option<[f64; COUNT]
     Some(std::array::from_fn(|at| shifts[at].abs()))
 }
 
-/// The model refitted with the needed parameters only; with all parameters where the loss rises by more than the linearised
-/// estimate.
+/// The model refitted with the needed parameters only; with all of them where the loss of the refit rises by [`NEEDED`] or more
+/// for each parameter that is held.
 pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
     let Some(all) = fit_for_comparison(engine, model) else { return model.clone() };
     let Some(needed) = needed(engine, &all) else { return all };

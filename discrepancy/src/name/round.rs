@@ -46,7 +46,7 @@ const CLOSE: f64 = 0.02;
 const BACKLASH_BESIDE: usize = 2;
 
 struct Contenders {
-    null_loss: f64,
+    loss_before: f64,
     best: Vec<ScreenedCandidate>,
     /// The backlash of linked rods, whatever its screened gain.
     backlash: Option<ScreenedCandidate>,
@@ -59,7 +59,7 @@ impl Contenders {
     /// The last round's threshold came from a residual with unexplained signal: it decides when to stop searching, not what to
     /// reject.
     fn of(
-        (null_loss, screened): (f64, Vec<ScreenedCandidate>),
+        (loss_before, screened): (f64, Vec<ScreenedCandidate>),
         engine: &Engine<'_>,
         columns: &Columns,
         model: &Refit,
@@ -73,7 +73,7 @@ impl Contenders {
         all.sort_by(|left, right| left.loss.total_cmp(&right.loss));
         let (large, small): (Vec<ScreenedCandidate>, Vec<ScreenedCandidate>) =
             all.into_iter().partition(|screened| amplitude_ratio(&screened.start) > MIN_SCREENED_RATIO);
-        let gain = |screened: &ScreenedCandidate| null_loss - screened.loss;
+        let gain = |screened: &ScreenedCandidate| loss_before - screened.loss;
         let enough = |screened: &[ScreenedCandidate]| {
             screened
                 .first()
@@ -82,7 +82,7 @@ impl Contenders {
         let is_backlash =
             |screened: &&ScreenedCandidate| columns.candidates[screened.at].sheet.moves_start_states;
         let backlash = if engine.is_linked() { large.iter().find(is_backlash).cloned() } else { None };
-        let share = if lacks_fit(engine, null_loss) { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
+        let share = if lacks_fit(engine, loss_before) { CONTENDER_SHARE_INEXACT } else { CONTENDER_SHARE };
         let most = [&large, &small].map(|all| all.first().map_or(0.0, gain));
         let count = if model.effects.len() < 2 { CONTENDERS } else { CONTENDERS_LATE };
         let best = |mut all: Vec<ScreenedCandidate>, count: usize, least: f64| {
@@ -91,10 +91,10 @@ impl Contenders {
             all
         };
         [
-            enough(&large).then(|| Self { null_loss, best: best(large, count, share * most[0]), backlash }),
+            enough(&large).then(|| Self { loss_before, best: best(large, count, share * most[0]), backlash }),
             enough(&small)
                 .then(|| Self {
-                    null_loss,
+                    loss_before,
                     best: best(small, SMALL_CONTENDERS, SMALL_CONTENDER_SHARE * most[0].max(most[1])),
                     backlash: None,
                 })
@@ -154,22 +154,22 @@ impl<'a> SelectionRound<'a> {
         contenders: &Contenders,
         progress: &mut dyn FnMut(&str),
     ) -> Option<Self> {
-        let Contenders { null_loss, best, backlash } = contenders;
+        let Contenders { loss_before, best, backlash } = contenders;
         let fits = parallel::map(best, |screened| {
-            let start = best_start(engine, linearisation, &model.effects, screened, *null_loss);
+            let start = best_start(engine, linearisation, &model.effects, screened, *loss_before);
             refit_steps(engine, linearisation, &start, STEPS)
         });
         let mut fits: Vec<Refit> = fits.into_iter().flatten().collect();
         sort(&mut fits);
         // These fits used the sensitivities of the model without the effect; the best are relinearised. Gains compare with the
         // null loss of the same sensitivities.
-        let gain = null_loss - fits.first()?.loss;
+        let gain = loss_before - fits.first()?.loss;
         let near =
-            fits.iter().take(RELINEARISED).filter(|fit| null_loss - fit.loss >= 0.5 * gain).count().max(1);
+            fits.iter().take(RELINEARISED).filter(|fit| loss_before - fit.loss >= 0.5 * gain).count().max(1);
         let once = parallel::map(&fits[..near], |fit| relinearise_once(engine, at_best_pitch(engine, fit)));
-        let most = once.iter().map(|fit| null_loss - fit.loss).fold(0.0, f64::max);
+        let most = once.iter().map(|fit| loss_before - fit.loss).fold(0.0, f64::max);
         let restarted = parallel::map(&once, |fit| {
-            let may_be_best = null_loss - fit.loss >= MAY_BE_BEST * most;
+            let may_be_best = loss_before - fit.loss >= MAY_BE_BEST * most;
             let fit = if may_be_best { relinearise(engine, fit.clone()) } else { fit.clone() };
             refit_with_starts(engine, &fit)
         });
@@ -247,7 +247,7 @@ fn best_start(
     linearisation: &Linearisation,
     model: &[EffectEstimate],
     screened: &ScreenedCandidate,
-    null_loss: f64,
+    loss_before: f64,
 ) -> Vec<EffectEstimate> {
     let with = |amplitude: f64| {
         let mut effects = model.to_vec();
@@ -258,7 +258,7 @@ fn best_start(
     };
     let screened_z = screened.start.coordinates[0];
     let loss = loss_at(engine, linearisation, &with(screened_z));
-    if loss < screened.loss + MOST_SHORTFALL * (null_loss - screened.loss) {
+    if loss < screened.loss + MOST_SHORTFALL * (loss_before - screened.loss) {
         return with(screened_z);
     }
     let [least, most] = screened.start.candidate.range(0);

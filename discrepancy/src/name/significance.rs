@@ -77,8 +77,11 @@ impl Fitted<'_> {
             self.threshold.max(MIN_LOSS_REDUCTION)
         };
         let gain_without_best = without_best(&gains) - charged;
-        let chance =
-            if self.engine.is_linked() { None } else { Some(self.by_chance(model, gain_without_best)?) };
+        let chance = if self.engine.is_linked() {
+            None
+        } else {
+            Some(self.drawn_under_null(model, gain_without_best)?)
+        };
         let left = DRAWS - chance.as_ref().map_or(DRAWS, |chance| chance.draws);
         let other = self.other(model).filter(|_| left >= AT_ONCE);
         Some(Significance {
@@ -93,7 +96,7 @@ impl Fitted<'_> {
     }
 
     /// Records drawn with parameters alone; `None` where no rig has them.
-    fn by_chance(&self, model: &Refit, gain: f64) -> Option<DrawnRecords> {
+    fn drawn_under_null(&self, model: &Refit, gain: f64) -> Option<DrawnRecords> {
         let engine = self.engine;
         let truth = Truth::new(engine, self.calibrated)?;
         // Whatever the factors, these columns span what parameters do; priors count from where the factors are.

@@ -138,7 +138,7 @@ fn parameters(engine: &Engine<'_>, found: &SelectionResult) -> (Vec<Quantity>, V
 }
 
 fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
-    let null_loss = found.null_loss;
+    let calibrated_loss = found.calibrated_loss;
     let objection = found.significance.as_ref().and_then(|tests| Some((tests, tests.rejection_reason()?)));
     found
         .screened
@@ -175,7 +175,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             report::Candidate {
                 effect: candidate.sheet.name.to_owned(),
                 place: place_of(candidate.place),
-                score: (null_loss - screened.loss) / found.threshold.max(1e-9),
+                score: (calibrated_loss - screened.loss) / found.threshold.max(1e-9),
                 share_explained: share,
                 fit: alone.map(|fit| fit.convergence),
                 amplitude: candidate.effect_parameters(&shown.coordinates)[0],

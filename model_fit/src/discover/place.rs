@@ -4,7 +4,7 @@
 //!   place p, variables x (and y):   x, |x|, x^2, x |x|, x^3, sign x     or   x y, x^2 y, x y^2     or a constant
 //!   g_k  = responses of all outputs to the coefficients of these at p, less what the model's own numbers can do
 //!   R^2  = share of what is left that the g_k of a group explain together
-//!   worth = -n ln(1 - R^2) - k ln n        n independent samples, k functions
+//!   BIC gain = -n ln(1 - R^2) - k ln n        n independent samples, k functions
 //! ```
 //! The groups that lead are fitted in the simulator, and their share is what the fit took: a strong term is not linear in its
 //! size, and a lag is not in its time.
@@ -64,7 +64,7 @@ struct Group {
     /// It is a lag, not a function.
     is_of_change: bool,
     terms: Vec<usize>,
-    worth: f64,
+    bic_gain: f64,
     share: f64,
     rank: usize,
 }
@@ -81,7 +81,7 @@ pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
     let mut samples: f64 = baseline.effective.iter().sum();
     let mut groups = groups(&with_terms, first, &terms);
     groups.iter_mut().for_each(|group| group.weigh(screen.share(&group.terms), samples));
-    groups.sort_by(|one, other| other.worth.total_cmp(&one.worth));
+    groups.sort_by(|one, other| other.bic_gain.total_cmp(&one.bic_gain));
     let rows: usize = baseline.fitting.records.iter().map(|record| record.time_s.len()).sum();
     groups.truncate((ROWS / rows.max(1)).clamp(FITTED[0], FITTED[1]));
     let fits: Vec<Option<(f64, f64)>> =
@@ -89,21 +89,21 @@ pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
     for (group, fit) in groups.iter_mut().zip(&fits) {
         group.weigh(fit.map_or(group.share, |(share, _)| share), samples);
     }
-    let most = |groups: &[Group]| groups.iter().map(|group| group.worth).fold(f64::NEG_INFINITY, f64::max);
+    let most = |groups: &[Group]| groups.iter().map(|group| group.bic_gain).fold(f64::NEG_INFINITY, f64::max);
     // What is left without the missing term may hang together over the whole record; what the best leaves does not.
     let best = most(&groups);
-    let of_best = groups.iter().zip(&fits).filter(|(group, _)| group.worth >= best);
+    let of_best = groups.iter().zip(&fits).filter(|(group, _)| group.bic_gain >= best);
     samples = of_best.filter_map(|(_, fit)| Some((*fit)?.1)).fold(samples, f64::max);
     groups.iter_mut().for_each(|group| group.weigh(group.share, samples));
     let best = most(&groups);
-    groups.retain(|group| group.worth > best - GAIN_APART.max(MORE * samples));
+    groups.retain(|group| group.bic_gain > best - GAIN_APART.max(MORE * samples));
     let fewest = groups.iter().map(|group| group.place.variables.len()).min()?;
     groups.retain(|group| group.place.variables.len() == fewest);
     let best = most(&groups);
-    groups.retain(|group| group.worth > best - SAME.max(AS_MUCH * samples));
-    groups.sort_by(|one, other| one.rank.cmp(&other.rank).then(other.worth.total_cmp(&one.worth)));
+    groups.retain(|group| group.bic_gain > best - SAME.max(AS_MUCH * samples));
+    groups.sort_by(|one, other| one.rank.cmp(&other.rank).then(other.bic_gain.total_cmp(&one.bic_gain)));
     let mut groups = groups.into_iter();
-    let best = groups.next().filter(|best| best.share >= LEAST_SHARE && best.worth > 0.0)?;
+    let best = groups.next().filter(|best| best.share >= LEAST_SHARE && best.bic_gain > 0.0)?;
     let Place { place, variables } = best.place;
     Some(Located { place, variables, share: best.share, alternatives: groups.map(|one| one.place).collect() })
 }
@@ -111,12 +111,12 @@ pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
 impl Group {
     fn weigh(&mut self, share: f64, samples: f64) {
         self.share = share;
-        self.worth = -samples * (1.0 - share).max(1e-12).ln() - self.terms.len() as f64 * samples.ln();
+        self.bic_gain = -samples * (1.0 - share).max(1e-12).ln() - self.terms.len() as f64 * samples.ln();
     }
 }
 
 /// Share of what is left that some terms explain, fitted together with all that the model leaves open from the coefficients of
-/// the linear screening, and what the residual is worth in independent samples then; `None` where that cannot be simulated.
+/// the linear screening, and the effective sample size of the residual then; `None` where that cannot be simulated.
 fn refit(
     (with_terms, first): (&Model, usize),
     baseline: &Fitted<'_>,
@@ -158,7 +158,14 @@ fn groups(model: &Model, first: usize, terms: &[Term]) -> Vec<Group> {
             None => {
                 let target = model.suspects[first + index].target;
                 let rank = rank(target, model.target_name(target), &term.variables);
-                groups.push(Group { place, is_of_change, terms: vec![index], worth: 0.0, share: 0.0, rank });
+                groups.push(Group {
+                    place,
+                    is_of_change,
+                    terms: vec![index],
+                    bic_gain: 0.0,
+                    share: 0.0,
+                    rank,
+                });
             }
         }
     }

@@ -39,7 +39,7 @@ pub(super) fn prior_of(explanation: &Explanation, candidates: usize) -> f64 {
     }
 }
 
-/// Prior weights of sizes and memories of the term; they sum to one.
+/// Prior weights of sizes and correlation lengths of the term; they sum to one.
 pub(super) fn prior_of_terms(covariances: &[Covariance], kind: ExplanationKind) -> Vec<f64> {
     // The density times the size, since the grid is even in its logarithm.
     let weight = |size: f64| match kind {
@@ -129,7 +129,7 @@ mod tests {
     fn only_none_of_these_expects_a_large_term() {
         let covariances: Vec<Covariance> = std::iter::once(0.0)
             .chain([0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0])
-            .map(|size| Covariance { size, memory_blocks: 0.0 })
+            .map(|size| Covariance { size, correlation_blocks: 0.0 })
             .collect();
         for kind in KINDS {
             let prior = prior_of_terms(&covariances, kind);
