@@ -211,7 +211,8 @@ impl EmulatorNode {
         }
     }
 
-    /// Withdraws stale or disputed commands in `cycle`, records it, and steps the plant to the start of the next.
+    /// Latches the commands of `cycle`: drops stale ones, marks disputed ones, records both, and steps the plant to the start of
+    /// the next.
     pub(crate) fn act(&mut self, cycle: u64) {
         for axis in Axis::ALL {
             let Latched { change, age_cycles } = self.node.latch(axis);

@@ -115,7 +115,8 @@ pub(crate) struct MidpointAir<P = Pair> {
 /// The forces on each piston, N, along its own extension; viscous friction is in the motion's exponentials.
 struct Forces<P> {
     pneumatic: P,
-    hand: P,
+    /// Hands and effects, without friction.
+    external: P,
     sliding_friction: P,
     contact: P,
 }
@@ -123,7 +124,7 @@ struct Forces<P> {
 impl<P: Axes> Forces<P> {
     #[inline(always)]
     fn sum(&self) -> P {
-        self.pneumatic + self.hand + self.sliding_friction + self.contact
+        self.pneumatic + self.external + self.sliding_friction + self.contact
     }
 }
 
@@ -230,11 +231,11 @@ impl Integrator {
         let middle = laws.middle(step, extra_state);
         let zero = Pair::both(0.0);
         let moving = laws.moving(step);
-        let hand = laws.external_force(step, &middle);
+        let external = laws.external_force(step, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
-            hand,
-            sliding_friction: laws.sliding(step, &middle, extra_state, middle.pneumatic + hand, moving),
+            external,
+            sliding_friction: laws.sliding(step, &middle, extra_state, middle.pneumatic + external, moving),
             contact: zero,
         };
         if held.linked {
@@ -242,7 +243,7 @@ impl Integrator {
             // First as if what rests stays; then again with what the contact sets in motion.
             forces.contact =
                 Pair::both(self.contact(self.kinematics(span, to_middle, &from, moving, &forces)));
-            let resting_force = forces.pneumatic + forces.hand + forces.contact;
+            let resting_force = forces.pneumatic + forces.external + forces.contact;
             let starts = self.starting(laws, step, &middle, resting_force, moving);
             if starts.any() {
                 forces.sliding_friction =
@@ -252,7 +253,7 @@ impl Integrator {
                 forces.contact = Pair::both(self.contact(kinematics));
             }
         }
-        let force = forces.pneumatic + forces.hand + forces.contact;
+        let force = forces.pneumatic + forces.external + forces.contact;
         let mut place = |axis: usize| laws.advance(step, &middle, extra_state, axis, force.to_array()[axis]);
         let (drive, load) = (place(0), place(1));
         let extension = Pair::new(drive.extension, load.extension);

@@ -52,8 +52,9 @@ pub enum Change {
 #[derive(Default)]
 pub struct CommandIntake {
     sources: SourceWatch,
-    acting: Option<ValveCommand>,
-    /// The last one accepted, acting or not.
+    /// Acts from the next latch on, unless that drops it.
+    stored: Option<ValveCommand>,
+    /// The last one accepted, dropped or not.
     last: Option<ValveCommand>,
     /// An accepted command was there, and grew stale.
     expired: bool,
@@ -82,7 +83,7 @@ impl CommandIntake {
         }
         self.refused_since_accepted = 0;
         self.counters.accepted += 1;
-        self.acting = Some(command);
+        self.stored = Some(command);
         true
     }
 
@@ -91,18 +92,18 @@ impl CommandIntake {
     pub fn latch(&mut self, live: &LiveCycles) -> Option<Change> {
         let too_old =
             |command: &ValveCommand| live.age(command.echo).is_none_or(|age| age > STALE_AFTER_CYCLES);
-        let expired = self.acting.as_ref().is_some_and(too_old);
+        let expired = self.stored.as_ref().is_some_and(too_old);
         if expired {
-            self.acting = None;
+            self.stored = None;
             self.counters.expired += 1;
         }
         // In cycles that were sent, as all ages are: a stall of the rig is no silence of the sender.
         let disputed = self.sources.two_sources(live.sent);
-        let quarrel_changed = disputed != self.disputed;
+        let dispute_changed = disputed != self.disputed;
         self.disputed = disputed;
-        self.counters.two_sources += u64::from(quarrel_changed && disputed);
-        // One message a cycle is enough: the quarrel explains more than the age.
-        if quarrel_changed {
+        self.counters.two_sources += u64::from(dispute_changed && disputed);
+        // One message a cycle is enough: the dispute explains more than the age.
+        if dispute_changed {
             self.expired |= expired;
             return Some(if disputed { Change::TwoSources } else { Change::OneSource });
         }
@@ -110,14 +111,14 @@ impl CommandIntake {
             self.expired = true;
             return Some(Change::Expired);
         }
-        let fresh = self.acting.is_some() && std::mem::take(&mut self.expired);
+        let fresh = self.stored.is_some() && std::mem::take(&mut self.expired);
         fresh.then_some(Change::Fresh)
     }
 
     /// Valve opening that acts, in -1 to 1.
     #[must_use]
     pub fn opening(&self) -> f64 {
-        match &self.acting {
+        match &self.stored {
             Some(command) if command.enable && !self.disputed => command.opening,
             _ => 0.0,
         }
@@ -126,7 +127,7 @@ impl CommandIntake {
     /// Age of the acting command in cycles, 1 being the least; `None` without one.
     #[must_use]
     pub fn age_cycles(&self, live: &LiveCycles) -> Option<u64> {
-        self.acting.as_ref().and_then(|command| live.age(command.echo))
+        self.stored.as_ref().and_then(|command| live.age(command.echo))
     }
 
     /// The same when it is obeyed: not while two senders dispute it.
@@ -144,7 +145,7 @@ impl CommandIntake {
     /// Whether the valve is shut because no fresh command is there.
     #[must_use]
     pub fn stale(&self) -> bool {
-        self.acting.is_none()
+        self.stored.is_none()
     }
 }
 
@@ -205,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_that_grew_stale_in_a_quarrel_does_not_act_when_it_ends() {
+    fn a_command_that_grew_stale_in_a_dispute_does_not_act_when_it_ends() {
         let mut bench = Bench::default();
         bench.cycle(None);
         for _ in 0..30 {
@@ -214,7 +215,7 @@ mod tests {
             bench.intake.take(intruder, &bench.live);
             bench.cycle(Some(0.5));
         }
-        // Both fall silent: the quarrel and the command's life end within the same few cycles.
+        // Both fall silent: the dispute and the command's life end within the same few cycles.
         for _ in 0..30 {
             bench.cycle(None);
             let age = bench.intake.age_cycles(&bench.live);
@@ -280,7 +281,7 @@ mod tests {
         assert!(bench.intake.take(late, &bench.live));
         assert_eq!((bench.intake.counters.late, bench.intake.counters.duplicate), (1, 0));
         bench.cycle(Some(0.5));
-        let again = ValveCommand { alive: bench.alive, ..bench.intake.acting.unwrap() };
+        let again = ValveCommand { alive: bench.alive, ..bench.intake.stored.unwrap() };
         assert!(bench.intake.take(again, &bench.live));
         assert_eq!((bench.intake.counters.late, bench.intake.counters.duplicate), (1, 1));
         assert_eq!(bench.intake.opening(), 0.5);

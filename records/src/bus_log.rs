@@ -294,14 +294,14 @@ fn add_warnings(
 ) {
     for axis in Axis::ALL.into_iter().filter(|axis| record.has_axis(*axis)).collect::<Vec<_>>() {
         let name = axis.name();
-        let (commands, quarrels) = acting.counted()[axis.index()];
+        let (commands, disputes) = acting.counted()[axis.index()];
         if lost[axis.index()] > 0 {
             record.warn(None, format!("{} frames of {name} sensors are not in the log", lost[axis.index()]));
         }
         if commands > 0 {
             record.warn(None, format!("{commands} {name} commands are not in the log, by their counters"));
         }
-        if quarrels > 0 {
+        if disputes > 0 {
             record.warn(None, format!("two senders of {name} commands: its valve was shut meanwhile"));
         }
     }

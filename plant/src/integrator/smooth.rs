@@ -62,11 +62,11 @@ impl<P: Axes> Integrator<P> {
         let middle = laws.middle(step, extra_state);
 
         let moving = laws.moving(step);
-        let hand = laws.external_force(step, &middle);
+        let external = laws.external_force(step, &middle);
         let mut forces = Forces {
             pneumatic: middle.pneumatic,
-            hand,
-            sliding_friction: laws.sliding(step, &middle, extra_state, middle.pneumatic + hand, moving),
+            external,
+            sliding_friction: laws.sliding(step, &middle, extra_state, middle.pneumatic + external, moving),
             contact: zero,
         };
         let [to_middle, to_end] = laws.motion_factors(step);
@@ -80,7 +80,7 @@ impl<P: Axes> Integrator<P> {
             from.extension + (to_end.drift * from.velocity + to_end.push * force).where_true(moving);
         let mut sticks = None;
         if laws.on_bristles() != [false; 2] {
-            let unresisted = forces.pneumatic + forces.hand + forces.contact;
+            let unresisted = forces.pneumatic + forces.external + forces.contact;
             let place = |axis: usize, extra_state: &mut L::ExtraState| {
                 if !laws.on_bristles()[axis] {
                     return Place {
