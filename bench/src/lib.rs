@@ -14,7 +14,7 @@
 //! | [`gateway`] | a gateway to a bus for clients of the socketcand protocol |
 //! | [`soak`] | emulator and controllers over hours, every frame accounted for |
 //! | [`recorded_log`] | a log of the bus, checked to its last line |
-//! | [`export`] | a log as CSV, MDF4, ASC, BLF |
+//! | [`export`] | a log as CSV, MDF4, ASC, BLF; a run as MCAP, or as a trace for Perfetto |
 //! | [`replay`] | a log sent on a bus, by absolute time |
 //! | [`export_fmu`] | the plant as an FMU |
 //! | [`cli`], [`program`] | the command line, and the dispatch of its commands |

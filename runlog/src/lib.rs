@@ -1,4 +1,5 @@
-//! The files and records of a run, and the report of `discrepancy close`: each is written and read by one type.
+//! Names of a run's files; its JSON files, frames and time stamps, and the report of `discrepancy close`, each written and read
+//! by one type.
 //!
 //! | file | holds |
 //! |---|---|

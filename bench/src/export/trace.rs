@@ -8,7 +8,8 @@
 //! ```
 //! Time is in us since the first frame, or since cycle 0 if that was earlier. Timing rows use the monotonic clock, frames that
 //! of the log: the due time of cycle 0 is known in both. The stages of a row have measured lengths; they are drawn one after
-//! the other from the wake-up on, in the order of the process [`runlog::timing`].
+//! the other from the start of its slice, in the order of the process [`runlog::timing`]. A slice starts at the wake-up, or where
+//! the slice before it ends.
 //!
 //! Source: "Trace Event Format", Google 2016: X is a slice, i an instant, M metadata.
 
