@@ -138,3 +138,25 @@ fn every_file_of_tests_belongs_to_an_executable() {
     assert!(modules > 50, "only {modules} files of tests: the search is broken");
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
+
+#[test]
+fn every_mutant_of_the_list_applies() {
+    let read = |path: &str| {
+        fs::read_to_string(workspace().join(path)).unwrap_or_else(|error| panic!("{path}: {error}"))
+    };
+    let list = read("tests/mutants/list.tsv");
+    let mut mutants = 0;
+    for (number, line) in (1..).zip(list.lines()).filter(|(_, line)| !line.starts_with('#')) {
+        let [_, file, from, to] = line.split('\t').collect::<Vec<_>>()[..] else {
+            panic!("line {number}: {line}")
+        };
+        assert_eq!(
+            read(file).matches(from).count(),
+            1,
+            "tests/mutants/list.tsv:{number}: '{from}' stands once in {file}"
+        );
+        assert_ne!(from, to, "tests/mutants/list.tsv:{number}");
+        mutants += 1;
+    }
+    assert!(mutants >= 30, "{mutants} mutants");
+}
