@@ -7,7 +7,7 @@
 
 use crate::warn;
 use runlog::candump::{LogError, LogLine, LogReader};
-use runlog::run_folder::{BUS_LOG, SUMMARY_JSON, read_json};
+use runlog::run_folder::{BUS_LOG, SUMMARY_JSON};
 use runlog::summary::JoinedSummary;
 use std::fs::File;
 use std::io::BufReader;
@@ -106,7 +106,7 @@ fn reported_zero_ns(file: &Path, first_ns: u64) -> Option<u64> {
     if file.file_name()? != BUS_LOG {
         return None;
     }
-    let summary: JoinedSummary = read_json(&file.parent()?.join(SUMMARY_JSON)).ok()?;
+    let summary = JoinedSummary::read(&file.parent()?.join(SUMMARY_JSON)).ok()?;
     let zero_s = summary.bus_log_cycle_zero_s?;
     // Stamps of a log are whole microseconds, and so is its origin: an f64 of this size is not exact below them.
     let near = zero_s >= 0.0 && (zero_s - first_ns as f64 * 1e-9).abs() < NEAR_ZERO_S;

@@ -24,11 +24,11 @@ pub(crate) fn text(arguments: &BusLoadArguments) -> Result<String, RunError> {
 }
 
 fn wire_time(summary: &Path) -> Result<WireTimeReport, RunError> {
-    let refused = |reason: String| RunError::Input(format!("{}: {reason}", summary.display()));
-    let text = std::fs::read_to_string(summary).map_err(|error| refused(error.to_string()))?;
-    let summary: Summary = serde_json::from_str(&text).map_err(|error| refused(error.to_string()))?;
-    let wire_time = summary.bus_host.and_then(|host| host.wire_time);
-    wire_time.ok_or_else(|| refused("the bus of this run took no time; run with ?bitrate=1000000".into()))
+    let read = Summary::read(summary).map_err(|error| RunError::Input(error.to_string()))?;
+    read.bus_host.and_then(|host| host.wire_time).ok_or_else(|| {
+        let file = summary.display();
+        RunError::Input(format!("{file}: the bus of this run took no time; run with ?bitrate=1000000"))
+    })
 }
 
 fn markdown(analysis: &RigAnalysis, run: &WireTimeReport) -> String {

@@ -49,7 +49,7 @@ pub fn read(folder: &Path) -> Result<(JoinedSummary, JoinedRun), SummaryError> {
     if !summary_path.exists() {
         return Err(SummaryError::NoSummary(folder.into()));
     }
-    Ok((read_json(&summary_path)?, read_json(&folder.join(RUN_JSON))?))
+    Ok((JoinedSummary::read(&summary_path)?, read_json(&folder.join(RUN_JSON))?))
 }
 
 /// Joins the files of `folder` and writes them back.

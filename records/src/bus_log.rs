@@ -17,7 +17,7 @@ use plant::{Axis, PERIOD_S};
 use protocol::frames::{DecodeError, Frame, RigStatus, Sensors};
 use protocol::periods::CYCLE_NS;
 use runlog::candump;
-use runlog::run_folder::{SUMMARY_JSON, read_json};
+use runlog::run_folder::SUMMARY_JSON;
 use runlog::summary::JoinedSummary;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -120,7 +120,7 @@ impl CycleStarts {
 
 /// Start of cycle 0, from `summary.json` beside a run's `bus.log`.
 fn reported_zero_ns(file: &Path) -> Option<u64> {
-    let summary: JoinedSummary = read_json(&file.parent()?.join(SUMMARY_JSON)).ok()?;
+    let summary = JoinedSummary::read(&file.parent()?.join(SUMMARY_JSON)).ok()?;
     Some((summary.bus_log_cycle_zero_s? * 1e9).round() as u64)
 }
 

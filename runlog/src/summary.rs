@@ -5,6 +5,7 @@
 //! and fields whose absence means something are options, which the emulator always writes.
 
 use crate::controller_report::{ControllerFigures, IgnoredFrames};
+use crate::run_folder::{FileError, read_json};
 use crate::timing_recorder::{CommandAges, FlightFigures, TimingFigures};
 use protocol::bus::BusCounters;
 use protocol::bus::host::HostReport;
@@ -13,6 +14,7 @@ use realtime::{ArrivalFigures, Machine, Percentiles, VitalTotals, WallClockStep}
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 /// The pace of a rehearsal, which has no emulator.
 pub const REHEARSAL: &str = "rehearsal";
@@ -148,6 +150,16 @@ pub struct Summary<E = RecordedEvent> {
     pub event_count: Option<u64>,
     /// The first events of each kind.
     pub events: Vec<E>,
+}
+
+impl Summary {
+    /// Reads the file. A function without parameters of type is compiled once, and here; [`read_json`] once in each crate.
+    ///
+    /// # Errors
+    /// As [`read_json`].
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        read_json(path)
+    }
 }
 
 /// An event as it stands in a file, whatever its kind.
@@ -349,6 +361,16 @@ pub struct JoinedSummary {
     /// The other keys of [`Summary`].
     #[serde(flatten)]
     pub further: Map<String, Value>,
+}
+
+impl JoinedSummary {
+    /// Reads the file, joined or not.
+    ///
+    /// # Errors
+    /// As [`read_json`].
+    pub fn read(path: &Path) -> Result<Self, FileError> {
+        read_json(path)
+    }
 }
 
 /// What a joined summary has of the controllers' reports.

@@ -10,12 +10,10 @@ use protocol::bus::host::HostReport;
 use runlog::Axis;
 use runlog::controller_report::{AxisReport, ControllerReport};
 use runlog::process::Process;
-use runlog::run_folder::{BUS_LOG, RUN_JSON, SUMMARY_JSON};
+use runlog::run_folder::{BUS_LOG, FileError, RUN_JSON, SUMMARY_JSON, read_json};
 use runlog::summary::{ProcessReport, RunDescription, Summary};
-use serde::de::DeserializeOwned;
 use serde_json::Value;
 use std::collections::BTreeMap;
-use std::io::ErrorKind;
 use std::path::Path;
 
 /// The files of a segment; defaults for missing ones.
@@ -34,15 +32,17 @@ pub(super) struct SegmentFiles {
     pub damaged: Vec<String>,
 }
 
-/// Reads a file as its type; returns the default for a missing file, and for an invalid one, which goes to `damaged`.
-fn read_json<T: DeserializeOwned + Default>(path: &Path, damaged: &mut Vec<String>) -> T {
-    let read = match std::fs::read(path) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return T::default(),
-        Err(error) => Err(error.to_string()),
-        Ok(bytes) => serde_json::from_slice(&bytes).map_err(|error| error.to_string()),
-    };
-    read.unwrap_or_else(|error| {
-        damaged.push(format!("{}: {error}", path.display()));
+/// Reads a file; returns the default for a missing file, and for an invalid one, which goes to `damaged`.
+fn read_if_any<T: Default>(
+    path: &Path,
+    damaged: &mut Vec<String>,
+    read: impl FnOnce(&Path) -> Result<T, FileError>,
+) -> T {
+    if path.try_exists().is_ok_and(|exists| !exists) {
+        return T::default();
+    }
+    read(path).unwrap_or_else(|error| {
+        damaged.push(error.to_string());
         T::default()
     })
 }
@@ -63,12 +63,14 @@ impl SegmentFiles {
         let log = folder.join(BUS_LOG);
         let mut damaged = Vec::new();
         Self {
-            summary: read_json(&summary, &mut damaged),
-            machine: read_json::<RunDescription<Value, Value>>(&run, &mut damaged).machine,
-            run: read_json(&run, &mut damaged),
-            reports: reports.map(|(name, path)| (name.to_owned(), read_json(&path, &mut damaged))).collect(),
+            summary: read_if_any(&summary, &mut damaged, Summary::read),
+            machine: read_if_any(&run, &mut damaged, read_json::<RunDescription<Value, Value>>).machine,
+            run: read_if_any(&run, &mut damaged, read_json),
+            reports: reports
+                .map(|(name, path)| (name.to_owned(), read_if_any(&path, &mut damaged, read_json)))
+                .collect(),
             controllers: controllers
-                .map(|(name, path)| (name.to_owned(), read_json(&path, &mut damaged)))
+                .map(|(name, path)| (name.to_owned(), read_if_any(&path, &mut damaged, read_json)))
                 .collect(),
             damaged,
             log: frame_log::read(&log).map_err(|error| format!("{}: {error}", log.display())),
