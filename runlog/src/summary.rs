@@ -153,7 +153,7 @@ pub struct Summary<E = RecordedEvent> {
 }
 
 impl Summary {
-    /// Reads the file. A function without parameters of type is compiled once, and here; [`read_json`] once in each crate.
+    /// Reads the file. Not generic, so that it is compiled once; [`read_json`] is in each crate that calls it.
     ///
     /// # Errors
     /// As [`read_json`].
