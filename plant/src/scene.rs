@@ -42,7 +42,7 @@
 //! |---|---|
 //! | `file.rs` | the text, checked, with messages that name file, line, key, value and range |
 //! | `hand.rs` | force of a push and of a guiding hand |
-//! | `stop.rs` | who holds the emergency stop, and what the rig calls out about it |
+//! | `stop.rs` | holders of the emergency stop, and the rig's announcements of it |
 //! | `people.rs` | what is due in a cycle, done to a plant |
 
 mod file;

@@ -21,7 +21,7 @@ pub(super) fn quantity(controls: u32) -> Result<Quantity, RefusalReason> {
     }
 }
 
-/// Names are keys of program files and each its own, ranges are ranges, defaults lie in them.
+/// Checks that names are valid, unique keys of program files, ranges are valid, and defaults lie in them.
 pub(super) fn table(parameters: &[Parameter]) -> Result<(), RefusalReason> {
     for (place, parameter) in parameters.iter().enumerate() {
         let Parameter { name, least, most, default, .. } = parameter;

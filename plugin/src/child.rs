@@ -34,7 +34,7 @@ const LOOK_EVERY: Duration = Duration::from_millis(2);
 /// How much of what a library prints is kept, bytes.
 const MOST_TEXT: usize = 1 << 16;
 
-/// Who tries libraries.
+/// Runs the trial of a library in a child process.
 #[derive(Clone, Debug)]
 pub struct TrialRunner {
     /// The controller program, which is started as `controller probe-library FILE`.

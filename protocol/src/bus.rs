@@ -164,13 +164,13 @@ pub trait Bus: FrameSink + Send {
     /// Tells the barrier that this member has posted its frames of `cycle`.
     fn done(&mut self, cycle: u32);
 
-    /// Takes no more of what arrives from now on; what has arrived can still be received, to the last frame, after which there
-    /// is [`Received::Nothing`]. So that what the host delivered was also received, and the account has no open end. On
-    /// `can://`, where nobody counts what a peer that goes leaves unread, it does nothing.
+    /// Refuses what arrives from now on; frames that arrived before can still be received, then [`Received::Nothing`] follows.
+    /// The host's count of delivered frames then equals the peer's count of received ones. On `can://` it does nothing, since
+    /// frames left unread are not counted there.
     fn leave(&mut self) {}
 
-    /// The socket of a peer that is up, to be polled together with others; what was read from it and not yet received is none of
-    /// its business, so receive to [`Received::Nothing`] before polling. `None` while the bus is down, or for a peer without one.
+    /// The socket of a peer that is up, to be polled together with others; polling does not see packets that were read and
+    /// not yet received, so receive to [`Received::Nothing`] first. `None` while the bus is down, or for a peer without one.
     fn socket(&self) -> Option<BorrowedFd<'_>> {
         None
     }

@@ -9,7 +9,7 @@
 //! | `files` | reading below a root, so that tests bring their own `/proc` and `/sys` |
 //! | `kernel` | preemption model |
 //! | `hypervisor` | signs of a hypervisor, QEMU's emulation of the processor |
-//! | `throttling` | the kernel's brake on real-time threads |
+//! | `throttling` | RT throttling |
 //! | `processors` | model, SMT, frequency, idle states, which CPU takes which interrupt |
 //! | `frequency` | frequency policy and governor of CPUs |
 //! | `sharing` | interrupts of a CPU, CPUs that share a core |
@@ -67,7 +67,7 @@ pub struct Machine {
     pub processors_allowed: String,
     /// Simultaneous multithreading: whether, and which CPUs share a core.
     pub smt: SharedCores,
-    /// Frequency of each group of CPUs: driver, governor, range; or that nobody here sets it.
+    /// Frequency of each group of CPUs: driver, governor, range; or that this kernel has no frequency control.
     pub frequency_governors: Vec<FrequencyPolicy>,
     /// Driver and governor of the idle states.
     pub idle_driver: String,
@@ -77,15 +77,15 @@ pub struct Machine {
     pub clock_source: String,
     /// Clock sources that there are.
     pub clock_sources_available: String,
-    /// Signs of a hypervisor below this kernel, or `none`. It can stop all CPUs, and no counter in here tells.
+    /// Signs of a hypervisor below this kernel, or `none`. It can stop all CPUs, and no counter of the guest shows it.
     pub hypervisor: Hypervisor,
     /// How much of each period real-time threads may have.
     pub rt_throttling: Throttling,
-    /// CPUs that the scheduler leaves alone.
+    /// Isolated CPUs (`isolcpus`).
     pub isolated: String,
     /// CPUs without a periodic tick.
     pub nohz_full: String,
-    /// CPUs that an interrupt without a wish of its own may go to.
+    /// Default interrupt affinity (`default_smp_affinity`).
     pub interrupts_default: String,
     /// Which interrupts may and do go where, by CPU.
     pub interrupts: BTreeMap<String, InterruptRoute>,

@@ -51,7 +51,7 @@ pub enum FrameOutcome {
     },
     /// The node processed it.
     Handled,
-    /// The node does not process it: a frame that not every rig obeys.
+    /// The node does not process it; the caller decides, since not every rig obeys it.
     Unhandled(Frame),
 }
 

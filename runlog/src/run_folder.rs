@@ -1,4 +1,4 @@
-//! Files of a run's folder, written so that whoever reads them never meets half a fact.
+//! Files of a run's folder, written so that a reader never sees an incomplete line or JSON file.
 //!
 //! Tables grow by whole lines; JSON appears at once by being renamed. A process that is killed leaves files that read
 //! to their last line.
@@ -57,7 +57,7 @@ pub fn controller_csv(axis: Axis) -> String {
 }
 
 /// Files that programs write at the end of a run, or at its start in one go, and the emulator's own that it does not make in
-/// every run: what is left of an earlier run is none of this one's. What grows during a run is not among them, tables,
+/// every run; those of an earlier run are removed. What grows during a run is not among them, tables,
 /// `*.hlog` and dumps of the flight recorder ([`crate::flight_dump::clear`]): its writer makes it anew at its own start, and a
 /// controller may start before the rig. A controller's file whose axis no report of the run names is therefore of an earlier run.
 #[must_use]

@@ -266,7 +266,7 @@ pub struct RehearsalSummary {
 pub struct RehearsalEvent {
     /// The rig's cycle.
     pub cycle: u64,
-    /// What the rig came to, in its own words.
+    /// The outcome, in Rust's `Debug` form.
     pub what: String,
 }
 

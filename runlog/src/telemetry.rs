@@ -1,4 +1,4 @@
-//! Telemetry: what the emulator tells whoever looks on, as packets over a Unix stream; and what a viewer asks, as lines.
+//! Telemetry: records for viewers, as packets over a Unix stream; commands of viewers, as lines.
 //!
 //! ```text
 //!   emulator ──► [length u32 LE][kind u8][payload of that length] … ──► viewer

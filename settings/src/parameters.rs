@@ -18,7 +18,7 @@ pub struct Parameter {
     pub least: f64,
     /// Largest allowed value.
     pub most: f64,
-    /// Value when nothing is said.
+    /// Default value.
     pub default: f64,
     /// What it does.
     pub meaning: Cow<'static, str>,
@@ -102,7 +102,7 @@ impl Parameter {
 pub struct Declaration {
     unit: &'static str,
     range: [f64; 2],
-    /// Value when nothing is said.
+    /// Default value.
     pub default: f64,
     meaning: &'static str,
     whole: bool,

@@ -36,7 +36,7 @@ impl<'a> Section<'a> {
         Self { source, path, table, at, asked: Vec::new() }
     }
 
-    /// Its keys, in the order of the file. To ask is not to allow them.
+    /// Its keys, in the order of the file. They are not marked as known.
     #[must_use]
     pub fn keys(&self) -> Vec<String> {
         let mut keys: Vec<_> = self.table.keys().collect();
@@ -118,25 +118,25 @@ impl<'a> Section<'a> {
         self.entry(key).map_or(self.at, |value| value.span().start)
     }
 
-    /// Whether the key is there. To ask is not to allow it.
+    /// Whether the key is there. It is not marked as known.
     #[must_use]
     pub fn has(&self, key: &str) -> bool {
         self.entry(key).is_some()
     }
 
-    /// The text under `key`, if it is there and one. To look is not to allow it.
+    /// The text under `key`; `None` when absent or no text. The key is not marked as known.
     #[must_use]
     pub fn peek(&self, key: &str) -> Option<&str> {
         self.entry(key).and_then(|value| value.get_ref().as_str())
     }
 
-    /// The number under `key`, if it is there and one. To look is not to allow it.
+    /// The number under `key`; `None` when absent or no number. The key is not marked as known.
     #[must_use]
     pub fn peek_number(&self, key: &str) -> Option<f64> {
         self.entry(key).and_then(|value| number(value.get_ref()))
     }
 
-    /// The numbers of the list under `key`, if it is there and one of numbers. To look is not to allow it.
+    /// The numbers listed under `key`; `None` when absent or no list of numbers. The key is not marked as known.
     #[must_use]
     pub fn peek_numbers(&self, key: &str) -> Option<Vec<f64>> {
         self.entry(key)?.get_ref().as_array()?.iter().map(|item| number(item.get_ref())).collect()
@@ -350,7 +350,7 @@ impl<'a> Section<'a> {
         self.allow(&asked)
     }
 
-    /// Refuses keys that are none of these, before any is read: what follows from a misspelt table is said less clearly.
+    /// Refuses keys that are none of these, before any is read: errors caused by a misspelt table name would be less clear.
     ///
     /// # Errors
     /// The first of them.

@@ -42,7 +42,7 @@ impl<'a> Source<'a> {
         Self::new(text, file, false)
     }
 
-    /// The same of a file with secrets: messages repeat neither its lines nor a value of another kind than the one asked for.
+    /// The same of a file with secrets: messages quote neither its lines nor a value of the wrong type.
     ///
     /// # Errors
     /// [`SettingsError`] for what is no TOML.
@@ -97,7 +97,7 @@ impl<'a> Source<'a> {
         })
     }
 
-    /// Where the text of a value begins: behind its quote where it is written as it reads, else at the value.
+    /// Byte at which the text of a value begins: after its quote if it has no escapes, else at the value.
     pub(crate) fn start_of_text(&self, value: &Spanned<DeValue<'_>>, text: &str) -> usize {
         let span = value.span();
         let raw = self.text.get(span.clone()).unwrap_or_default();

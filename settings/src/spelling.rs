@@ -1,6 +1,6 @@
 //! The word that was meant by one that is misspelt.
 
-/// The one of these that is written most alike: at most a third of its letters are others.
+/// The known word of least edit distance, if that is at most a third of its length.
 pub(crate) fn nearest<'a>(name: &str, known: &[&'a str]) -> Option<&'a str> {
     let distances = known.iter().map(|known| (edits(name, known), *known));
     let (edits, known) = distances.min_by_key(|(edits, _)| *edits)?;

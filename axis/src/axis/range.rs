@@ -1,9 +1,9 @@
-//! Whether the axis's sensors are still within their range, by what the rig says of them.
+//! Detects lasting saturation of the axis's sensors from the flags of the rig's status.
 //!
-//! Force and pressures count, the position does not: a carriage at its end reads beyond the range whenever the noise is on
-//! that side. A status tells of the cycles since the one before, so its word holds until the next one; half a second of
-//! nothing else is 50 of them. Counted are cycles that were answered with a fresh status and in a run: in a standstill after an
-//! emergency stop trapped air presses as long as it wants, and a person must be able to release.
+//! Force and pressure sensors count. The position sensor does not: at an end of the stroke noise alone saturates it. A flag
+//! covers the cycles since the status before and holds until the next one; half a second is 50 statuses. Only cycles of a
+//! run that were answered with a fresh status count: after an emergency stop trapped air may press for any time, and a
+//! person must be able to release the stop.
 
 use crate::chains::Fault;
 use crate::chains::main::Phase;

@@ -78,7 +78,7 @@ pub enum Outcome {
 pub struct People {
     script: Script,
     holders: StopHolders,
-    /// Somebody wiggles the pin in, up to this cycle.
+    /// Last cycle of the attempts to link; `None` without one.
     linking_until: Option<u64>,
     /// What is done when the carriage passes a place; has room for all events.
     triggers: Vec<PositionTrigger>,

@@ -1,4 +1,4 @@
-//! Who holds the emergency stop, and what the rig calls out about its own.
+//! Holders of the emergency stop, and the rig's announcements of its own stop.
 //!
 //! ```text
 //!   nobody ── any of the four stops ──► held ── each who stopped has released ──► nobody

@@ -402,8 +402,8 @@ impl Host {
         self.waiting_since = Instant::now();
     }
 
-    /// Whether a foreign controller that has nothing to answer may not have seen yet what this cycle brought it. One that reads
-    /// nothing for the barrier's time-out is waited for no more, until it has read everything.
+    /// Whether a foreign controller that has nothing to answer may have unread frames of this cycle. One that reads nothing for
+    /// the barrier's time-out is not waited for again until it has read everything.
     fn waits_for_readers(&mut self) -> bool {
         let Some(barrier) = &self.barrier else { return false };
         let waited = self.waiting_since.elapsed();

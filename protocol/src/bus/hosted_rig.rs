@@ -10,7 +10,7 @@ use crate::can::{CanFrame, ERROR_FLAG};
 use rustix::time::Timespec;
 use std::time::Duration;
 
-/// Longest wait for a packet before the rig looks at the world again.
+/// Longest wait for a packet in one receive call.
 const PATIENCE: Timespec = Timespec { tv_sec: 0, tv_nsec: 50_000_000 };
 
 /// The rig on the bus that it hosts.

@@ -4,9 +4,9 @@
 //! small `recvmmsg` keeps them. The arrival stamp matters: a command is latched by when it *arrived*, not by when a
 //! late loop came round to read it. Batches matter too: one system call empties a queue and knows that it is empty.
 //!
-//! The kernel stamps by the wall clock, which somebody may set at any time. Arrivals are reported by the monotonic clock instead,
-//! with the distance of both as it is now or as it was at the last batch: whichever puts the arrival into the time in which
-//! it must have happened, between the moment in which the queue was last seen empty and now ([`arrival_ns`]).
+//! The kernel stamps arrivals by the wall clock, which may be stepped at any time. [`arrival_ns`] converts a stamp to the
+//! monotonic clock by the offset of the clocks, now or at the last batch: the one that puts the arrival between the time at
+//! which the queue was last seen empty and now.
 //!
 //! Source: `socket(7)` (SO_TIMESTAMPNS, SO_RXQ_OVFL), `recvmmsg(2)`, Linux Documentation/networking/can.rst (MSG_CONFIRM).
 

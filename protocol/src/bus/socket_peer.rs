@@ -31,7 +31,7 @@ pub(super) trait Link: Send {
 /// Time between two attempts to open a bus that is gone.
 const RETRY_PERIOD: Duration = Duration::from_millis(100);
 
-/// Longest sleep of a member of the barrier before it looks at the world again.
+/// Receive time-out of a member of the barrier.
 const BARRIER_PATIENCE: Duration = Duration::from_millis(50);
 
 /// A peer on a bus that is a packet socket.

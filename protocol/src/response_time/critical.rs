@@ -1,9 +1,9 @@
-//! The critical instant of a frame, played on the modelled wire: the worst that the analysis knows, and what comes of it.
+//! The critical instant of a frame, simulated on the modelled wire and compared with the bound of the analysis.
 //!
-//! The longest frame that it outranks has just begun when it and all that outrank it come at once, and then as early as they
-//! may. Each identifier has one content for all its frames, so that the stuffing of the frames that were sent is one number:
-//! with contents that differ, a bound made of the longest of each can reach beyond a period that the frames themselves end
-//! before.
+//! The longest frame of lower priority has just begun when the frame and all of higher priority are queued at once, and then
+//! as early as their jitter allows. All frames of an identifier have one content, so that each has one stuffed length: with
+//! differing contents, a bound made of the longest of each can extend over a period before whose end the simulated frames
+//! are sent.
 
 use super::rig::{RigAnalysis, RigFrame};
 use crate::bus::host::FramesById;

@@ -12,14 +12,14 @@ use std::fmt;
 
 const MS: u64 = 1_000_000;
 
-/// How much later than its period a cyclic frame may be queued, so that the next comes early against it. A guess: what a loop
-/// of FIFO priority keeps, save in its worst moments, on a machine that is not a computer of its own.
+/// Release jitter of a cyclic frame: largest delay of its queuing against its period. A guess: what a loop of FIFO priority
+/// keeps on a shared machine, except in its worst moments.
 pub const RELEASE_JITTER_NS: u64 = 50_000;
 
-/// The same of what the controllers answer to the rig's frames: an answer waits until what it answers is through, and comes early
-/// against the one before if that had more ahead of it: a [`Tick`](crate::frames::TICK) and an emergency stop are 200 bits. In
-/// lockstep, which has no machine, it is held by a test; 185 us were seen. With 220 us the analysis, which takes answers for
-/// independent of what they answer, would find no bound for the load's sensors within their ms.
+/// Release jitter of the controllers' answers. An answer is queued after the frame that it answers was sent, so its jitter
+/// includes the delay of that frame: a [`Tick`](crate::frames::TICK) and an emergency stop ahead of it are 200 bits. In lockstep
+/// a test checks it; 185 us were seen. The analysis treats answers as independent of what they answer; with 220 us it would
+/// find no bound for the load's sensors within 1 ms.
 pub const ANSWER_JITTER_NS: u64 = 200_000;
 
 /// Names of the answers end so.

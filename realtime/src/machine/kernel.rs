@@ -82,7 +82,7 @@ impl Machine {
     }
 }
 
-/// The model that the kernel was configured with, and the file that tells it.
+/// The model that the kernel was configured with, and the file that it was read from.
 fn configured(root: &Root) -> Option<(&'static str, String)> {
     let packed = root.bytes("proc/config.gz").and_then(|packed| {
         let mut text = String::new();

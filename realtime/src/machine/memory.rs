@@ -15,9 +15,9 @@ pub struct Memory {
     pub swap_total_kib: Option<u64>,
     /// Swap space in use, KiB.
     pub swap_used_kib: Option<u64>,
-    /// The kernel's liking for swap, 0 to 200.
+    /// `vm.swappiness`, 0 to 200.
     pub swappiness: String,
-    /// When memory is put together to huge pages, which moves it: the word in brackets counts.
+    /// Transparent huge pages, as in `enabled`: the word in brackets is in force.
     pub transparent_huge_pages: String,
 }
 

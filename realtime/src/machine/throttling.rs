@@ -1,4 +1,4 @@
-//! The kernel's brake on real-time threads. A thread that never sleeps is stopped for the rest of each period.
+//! RT throttling. A thread that never sleeps is stopped for the rest of each period.
 //!
 //! # Source
 //! `Documentation/scheduler/sched-rt-group` in the kernel's tree.
@@ -8,7 +8,7 @@ use super::text::stored_as_text;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// The brake by its settings and by their effect.
+/// RT throttling: settings and effect.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Throttling {

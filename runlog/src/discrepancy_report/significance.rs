@@ -18,8 +18,8 @@ pub struct Significance {
     pub least_gain: f64,
     /// Records drawn with parameters alone; null where the rods are linked.
     pub chance: Option<DrawnRecords>,
-    /// Records drawn with the other one of the two most probable explanations, where it has effects too: how often is the tested
-    /// set as far ahead of it as in the records? No condition of a name.
+    /// Records drawn with the other one of the two most probable explanations, where it has effects: how often the tested set
+    /// leads it by as much as in the records. Not a condition for naming.
     pub other: Option<DrawnRecords>,
 }
 
