@@ -34,7 +34,7 @@ pub(crate) enum Command {
     },
     /// Lay runs of one experiment side by side: figures with their change against the first run, curves over each other.
     Compare(CompareArguments),
-    /// Tell how much each figure spreads over repetitions of one experiment.
+    /// Print the spread of each figure over repetitions of one experiment.
     Spread(SpreadArguments),
     /// List all figures with unit and meaning.
     Figures,
@@ -73,7 +73,7 @@ pub(crate) enum Command {
     LatencyTable(LatencyTableArguments),
     /// Write a log of the bus as CSV, MDF4, ASC or BLF, or a whole run as MCAP or a trace.
     Export(ExportArguments),
-    /// Put a recorded log back on a bus by absolute time, and tell its timing error.
+    /// Put a recorded log back on a bus by absolute time, and report the timing error.
     Replay(ReplayArguments),
     /// Write the plant as a Functional Mock-up Unit, FMI 2.0 for co-simulation.
     ExportFmu(ExportFmuArguments),

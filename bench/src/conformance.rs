@@ -69,7 +69,7 @@ const TERMINATION_TIMEOUT: Duration = Duration::from_secs(2);
 /// Why the check cannot be made.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ConformanceError {
-    #[error("{0}; the check is the rig itself: end the emulator on this bus first")]
+    #[error("{0}; the check takes the place of the rig: end the emulator on this bus first")]
     Bus(#[from] BusError),
     #[error("the controller '{command}' does not start: {reason}")]
     Command { command: String, reason: String },
@@ -201,7 +201,7 @@ fn regular(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
         }
         cases.push(judge::every_cycle("skipped-cycles", &session.phase(from), session.arguments));
     } else {
-        let detail = "simulated time skips nothing: check it with --pace real".into();
+        let detail = "no cycle is skipped in simulated time: check it with --pace real".into();
         cases.push(case("skipped-cycles", "every-cycle", CheckResult::Skipped, detail));
     }
     cases.push(session.completion_case("regular"));
@@ -223,8 +223,7 @@ fn emergency_stop(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceErro
 /// The valve opens, the sensors fall silent, and come back.
 fn sensor_loss(mut session: Session<'_>) -> Result<Vec<Case>, ConformanceError> {
     if session.arguments.pace == CheckPace::LockstepEcho {
-        let detail =
-            "who is in the barrier by its echo alone must have sensors to answer: check it with --pace real";
+        let detail = "a controller that joins by its echo needs sensors to answer: check it with --pace real";
         return Ok(vec![case("sensor-loss", "valve-shut", CheckResult::Skipped, detail.into())]);
     }
     if !session.wait_for_open_valve()? {
@@ -345,7 +344,7 @@ impl<'a> Session<'a> {
     fn completion_case(&mut self, class: &str) -> Case {
         let ended = self.controller.as_mut().and_then(Controller::ended);
         let why = match (&self.exchange_error, ended) {
-            (Some(error), _) => format!("{error:?}"),
+            (Some(error), _) => error.to_string(),
             (None, _) if self.observer.babbles() => {
                 format!("it babbles, {} frames", self.observer.received.len())
             }
@@ -360,9 +359,9 @@ impl<'a> Session<'a> {
 
     fn valve_shut_case(&self, class: &str) -> Case {
         let why = match &self.exchange_error {
-            Some(error) => format!("in cycle {}: {error:?}", self.cycle),
+            Some(error) => format!("in cycle {}: {error}", self.cycle),
             None => format!(
-                "its valve did not open by more than {OPEN} for {OPEN_CYCLES} cycles in {} s: nothing could be seen; let it move",
+                "its valve did not open by more than {OPEN} for {OPEN_CYCLES} cycles within {} s: not judged; let it move",
                 self.arguments.patience
             ),
         };

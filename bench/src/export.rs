@@ -176,7 +176,7 @@ fn as_frames(
         None => Ok((format!("{reported}, read back equal"), Exit::Good)),
         Some(output) => {
             warn(&format!(
-                "what was written does not read back as it was: {output} (frames, and the first of them)"
+                "the written file differs when it is read back: {output} (number of frames, first of them)"
             ));
             Ok((reported, Exit::BoundBroken))
         }

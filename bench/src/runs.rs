@@ -17,7 +17,8 @@ pub(crate) enum RunsError {
     #[error(transparent)]
     File(#[from] FileError),
     #[error(
-        "{one} is of '{title_one}' and {other} of '{title_other}', which ask the rig for different things; --anyway lays them side by side all the same"
+        "{one} is of '{title_one}' and {other} of '{title_other}', which are different experiments; \
+         --anyway compares them all the same"
     )]
     DifferentExperiments { one: PathBuf, title_one: String, other: PathBuf, title_other: String },
 }

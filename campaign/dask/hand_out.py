@@ -93,10 +93,10 @@ def main():
                 left = passed / done * (len(missing) - done)
                 print(f"campaign: {done}/{len(missing)} parts, {left:.0f} s left", file=sys.stderr, flush=True)
     except (RuntimeError, KilledWorker) as error:
-        print(f"campaign: {error}; what is done is kept", file=sys.stderr)
+        print(f"campaign: {error}; finished parts are kept", file=sys.stderr)
         return 2
     except OSError as error:
-        print(f"campaign: {error}; what is done is kept", file=sys.stderr)
+        print(f"campaign: {error}; finished parts are kept", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("campaign: stopped; the same command goes on", file=sys.stderr)

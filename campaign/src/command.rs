@@ -45,7 +45,7 @@ pub(crate) enum CommandError {
     /// The program cannot be started, or not be waited for.
     #[error(transparent)]
     System(#[from] io::Error),
-    #[error("nothing was tried (exit code {NOT_TRIED}): {0}; what is done is kept")]
+    #[error("the command did not run (exit code {NOT_TRIED}): {0}; finished parts are kept")]
     NotTried(String),
 }
 

@@ -176,7 +176,7 @@ fn values(section: &mut Section<'_>) -> Result<Values, SettingsError> {
                 values.ok_or_else(|| section.refused("list", "allowed are finite numbers and names"))?;
             let doubled = values.iter().enumerate().find(|(place, value)| values[..*place].contains(value));
             if let Some((_, value)) = doubled {
-                return Err(section.refused("list", &format!("{value} stands there twice")));
+                return Err(section.refused("list", &format!("{value} is listed twice")));
             }
             Ok(Values::List(values))
         }

@@ -27,7 +27,7 @@ pub(crate) fn page(campaign: &Campaign, results: &Results, repeat: &dyn Fn(u64) 
     body += &lead(campaign, results);
     body += &endings(results);
     // Writing to a text cannot fail.
-    let _ = write!(body, "<h2>How the figures lie</h2>\n{}", distribution::section(results, &shown));
+    let _ = write!(body, "<h2>Distributions of the figures</h2>\n{}", distribution::section(results, &shown));
     body += &heat::section(campaign, results, &shown);
     body += &confusion::section(campaign, results);
     body += &worst::section(campaign, results, &shown, repeat);

@@ -39,20 +39,22 @@ pub(crate) struct Parts {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum PartError {
     #[error(
-        "{path}: is of another campaign, or the file or one that it names has changed since; give another --out"
+        "{path}: belongs to another campaign, or the campaign file or a file it names has changed; give another --out"
     )]
     OtherCampaign { path: String },
     #[error(
         "{path}: was made by another version of the programs ({theirs}, this is {ours}); use that version, or another --out"
     )]
     OtherProgram { path: String, theirs: String, ours: String },
-    #[error("{path}: {what}; run the campaign again: it makes this part anew, and what is missing")]
+    #[error("{path}: {what}; run the campaign again: it makes this part and the missing ones")]
     Unreadable { path: String, what: String },
 }
 
 /// A part that cannot be written.
 #[derive(Debug, thiserror::Error)]
-#[error("{path}: {error}; what is done is kept: make room and start again, only what is missing is done")]
+#[error(
+    "{path}: {error}; finished parts are kept: free disk space and run the same command to make the others"
+)]
 pub(crate) struct WriteError {
     path: String,
     error: io::Error,
@@ -222,7 +224,7 @@ mod tests {
         ] {
             fs::write(&path, &bad).unwrap();
             let reported = ours.read(out.path(), 0).unwrap_err().to_string();
-            assert!(reported.contains(words) && reported.contains("this part anew"), "{bad}: {reported}");
+            assert!(reported.contains(words) && reported.contains("makes this part"), "{bad}: {reported}");
         }
         fs::write(&path, [0xff, 0xfe]).unwrap();
         assert!(ours.read(out.path(), 0).unwrap_err().to_string().contains("cannot be read"));

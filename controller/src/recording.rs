@@ -158,7 +158,7 @@ pub(crate) fn sentence(news: NodeEvent) -> String {
         NodeEvent::State { axis, state, cycle, cause } => {
             format!("cycle {cycle}: {} {state}: {cause}", axis.name())
         }
-        NodeEvent::RigRestarted => "the rig started anew; starting over".into(),
+        NodeEvent::RigRestarted => "the rig restarted; starting over".into(),
         NodeEvent::BusLost => "the bus is gone; trying to come back".into(),
         NodeEvent::BusBack => "the bus is back".into(),
         NodeEvent::SensorsSilent => "no sensors for 0.2 s; waiting for the rig".into(),

@@ -65,7 +65,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     if let Some(error) = rehearsal.encode_error() {
         let cycle = rehearsal.cycles();
         return Err(RunError::Input(format!(
-            "the simulated rig broke in cycle {cycle}: {error}; its file makes it so"
+            "the simulated rig broke in cycle {cycle}: {error}; check the rig file"
         )));
     }
     let finished =

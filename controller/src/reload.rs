@@ -85,7 +85,7 @@ impl ProgramFile {
         let new = Self::new(&source, self.axis, rig).map_err(|error| error.to_string())?;
         let names = |of: &Self| of.variables.iter().map(|variable| variable.name.clone()).collect::<Vec<_>>();
         if names(&new) != names(self) {
-            return Err(reported("another algorithm needs another start".into()));
+            return Err(reported("a change of the algorithm needs a restart".into()));
         }
         let differs = |place: &usize| new.values[*place] != self.values[*place];
         let places: Vec<_> = (0..new.values.len()).filter(differs).collect();
@@ -115,7 +115,11 @@ fn fixed_change(old: &FixedSettings, new: &FixedSettings) -> Option<String> {
     let what = if key.ends_with("linearisation") { "linearisation" } else { "algorithm" };
     let reported =
         |settings: &FixedSettings| settings.get(key).map_or("left out".into(), |text| format!("\"{text}\""));
-    Some(format!("{key} is {} and was {}; another {what} needs another start", reported(new), reported(old)))
+    Some(format!(
+        "{key} is {} and was {}; a change of the {what} needs a restart",
+        reported(new),
+        reported(old)
+    ))
 }
 
 #[cfg(test)]
@@ -178,7 +182,7 @@ still_m = 0.001
         ] {
             let mut bench = Bench::new();
             let problem = bench.edit(from, to).unwrap_err();
-            for word in words.into_iter().chain(["load.toml", "needs another start"]) {
+            for word in words.into_iter().chain(["load.toml", "needs a restart"]) {
                 assert!(problem.contains(word), "'{word}' is missing in: {problem}");
             }
             assert!(bench.changes.1.is_empty());

@@ -292,7 +292,7 @@ fn verdict(arguments: &RunArguments, run: &FinishedRun) -> (Exit, String) {
         RunEnd::Interrupted => (Exit::Interrupted, "interrupted; everything recorded so far is saved".into()),
         RunEnd::BusGone => (
             Exit::BusFailed,
-            "nothing to answer for too long; is 'emulator run' on this bus, in the same --pace? see --bus-grace".into(),
+            "no sensors or no bus for too long; is 'emulator run' on this bus, in the same --pace? see --bus-grace".into(),
         ),
         RunEnd::LockstepTimeout => {
             (Exit::LockstepTimeout, "a member of the barrier was not done in time".into())

@@ -113,7 +113,7 @@ pub(crate) struct RunArguments {
     /// Write the time stamps of every cycle to emulator-timing.csv.
     #[arg(long)]
     pub(crate) full_timing: bool,
-    /// Freeze the flight recorder at a wake-up later than this, an execution longer than this, or a missed cycle, in us.
+    /// Freeze the flight recorder at a missed cycle, or a wake-up latency or execution time above this, in us.
     #[arg(long, default_value_t = DEFAULT_FLIGHT_LATE_US, value_parser = clap::value_parser!(u64).range(1..=60_000_000))]
     pub(crate) flight_late_us: u64,
     /// Turn off the flight recorder.

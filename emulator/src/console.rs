@@ -165,7 +165,7 @@ fn parse(line: &str, limits: Limits) -> Result<Option<Line>, String> {
         ["hand", ..] => Err(format!("'{}': hand takes 'carriage' or 'load', and a number, N", line.trim())),
         _ => Err(format!(
             "'{}' is none of stop, release, link, unlink, weights KG, hand carriage N, hand load N, fault NAME AT K=V, \
-             mend NAME AT, help, quit",
+             mend NAME AT, mend all, help, quit",
             line.trim()
         )),
     }

@@ -37,9 +37,9 @@ pub struct Fault {
 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub(crate) enum FaultError {
-    #[error("fault '{0}' is unknown; 'emulator faults' lists those that there are{near}", near = of_the_kind(.0))]
+    #[error("fault '{0}' is unknown; 'emulator faults' lists the known ones{near}", near = of_the_kind(.0))]
     Unknown(String),
-    #[error("at = '{at}': {fault} is at {allowed}")]
+    #[error("at = '{at}': {fault} acts at {allowed}")]
     Place { fault: &'static str, at: String, allowed: String },
     #[error("unknown key {key} = {value}; {fault} has {known}")]
     Key { fault: &'static str, key: String, value: String, known: String },

@@ -134,7 +134,7 @@ fn verdict(end: &RunEnd) -> (Exit, String) {
         ),
         RunEnd::MembersLeft => (Exit::BusFailed, "all members left the barrier before they were done".into()),
         RunEnd::LockstepTimeout(name) => {
-            (Exit::LockstepTimeout, format!("lockstep: '{name}' was not done within 5 s of wall time"))
+            (Exit::LockstepTimeout, format!("lockstep: '{name}' was not done within the time of --lockstep-timeout"))
         }
         RunEnd::Overrun(overrun) => (Exit::BoundBroken, overrun.to_string()),
         RunEnd::NotFinite => (

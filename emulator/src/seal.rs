@@ -46,7 +46,7 @@ fn head(arguments: &SealArguments) -> String {
     let axis = format!("{axis:?}").to_lowercase();
     let version = env!("CARGO_PKG_VERSION");
     format!(
-        "# SEALED: do not read on. This file says what a rig has that nobody is meant to know before it is found from a run:\n\
+        "# SEALED: do not read on. This file lists effects of a rig that are hidden until they are identified from a run:\n\
          #     emulator run --sealed FILE …\n\
          # Compare what you found with it afterwards, or with truth.csv of the run.\n\
          # Made by 'emulator seal --seed {seed} --effects {effects} --axis {axis}' of airbench {version}.\n\n"

@@ -129,7 +129,7 @@ impl Search<'_> {
             // With independent noise, as of two measurements.
             self.sealed(&folder, &format!("{name}/measured"), file, noise + seed)?;
         }
-        say("asking what is missing …");
+        say("identifying the missing effect …");
         let workflow = folder.join("workflow");
         self.close(&folder, &workflow)?;
         for (name, file) in self.experiments.clone() {

@@ -89,7 +89,7 @@ impl Plan {
         let cpus_asked = [cpu, arguments.controller_cpu.unwrap_or(other)];
         if let Some(missing) = cpus_asked.iter().find(|cpu| !cpus.contains(cpu)) {
             let there = cpus.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-            return refused(&format!("CPU {missing} is not there for this process; there are {there}"));
+            return refused(&format!("this process may not use CPU {missing}; it may use {there}"));
         }
         let (mut bounds, mut spin_bounds) = (arguments.bounds.clone(), None);
         if arguments.claims {
@@ -97,7 +97,7 @@ impl Plan {
                 return refused("--claims and --bounds are two files for one report; leave one out");
             }
             if arguments.spin_us == 0 {
-                return refused("--claims holds the spinning runs against 1 us too; leave out --spin-us 0");
+                return refused("--claims also needs the spinning runs (bound 1 us); leave out --spin-us 0");
             }
             bounds = Some(front.places.data("latency-bounds.toml")?);
             spin_bounds = Some(front.places.data("latency-bounds-spin.toml")?);

@@ -106,7 +106,7 @@ pub(crate) fn read(body: &[u8]) -> Result<Order, String> {
             };
             if !is_fitting {
                 return Err(
-                    "set-point takes position_m of the drive; of the load force_n or position_m, one of both"
+                    "set-point takes position_m for the drive; for the load either force_n or position_m"
                         .into(),
                 );
             }

@@ -22,11 +22,11 @@ pub(crate) fn text(view: &View, server_status: ServerStatus, bus_is_up: bool) ->
     let State { timing, bus, .. } = &state;
     one("up", "gauge", "Whether this program runs.", count(1));
     one("bus_connected", "gauge", "Whether the bus is there.", flag(bus_is_up));
-    one("telemetry_connected", "gauge", "Whether an emulator tells its cycles.", flag(view.telemetry));
+    one("telemetry_connected", "gauge", "Whether an emulator sends telemetry.", flag(view.telemetry));
     one("cycles_total", "counter", "Cycles of the rig.", state.cycle.and_then(count));
     one("skipped_cycles_total", "counter", "Cycles computed late and not sent.", count(timing.skipped));
     one("overruns_total", "counter", "Wake-ups that missed at least one cycle.", count(timing.overruns));
-    one("frames_lost_total", "counter", "Sensor frames that did not come here.", count(bus.lost));
+    one("frames_lost_total", "counter", "Sensor frames lost on the way to this program.", count(bus.lost));
     one("frames_malformed_total", "counter", "Frames that are not as rig.dbc says.", count(bus.malformed));
     one(
         "bus_load_percent",
@@ -42,7 +42,7 @@ pub(crate) fn text(view: &View, server_status: ServerStatus, bus_is_up: bool) ->
     one("faults_active", "gauge", "Faults that are put into the run.", count(faults));
     let is_supported = state.claim.as_ref().is_some_and(|claim| claim.supported == Support::Yes);
     one("latency_claim_supported", "gauge", "Whether the run supports a latency claim.", flag(is_supported));
-    one("viewers", "gauge", "Listeners to events.", count(state.viewers as u64));
+    one("viewers", "gauge", "Clients subscribed to events.", count(state.viewers as u64));
     one(
         "viewer_events_missed_total",
         "counter",
@@ -50,7 +50,7 @@ pub(crate) fn text(view: &View, server_status: ServerStatus, bus_is_up: bool) ->
         count(state.dropped),
     );
     let lost = count(state.telemetry_records_lost);
-    one("telemetry_records_lost_total", "counter", "Records of the emulator that did not come here.", lost);
+    one("telemetry_records_lost_total", "counter", "Telemetry records lost on the way.", lost);
     for column in COLUMNS.iter() {
         let help = format!("Column of the page, in {}.", column.unit);
         one(&column.name, "gauge", &help, state.last.get(&column.name).copied().flatten());
@@ -60,7 +60,7 @@ pub(crate) fn text(view: &View, server_status: ServerStatus, bus_is_up: bool) ->
         let _ = writeln!(text, "airbench_frames_total{{frame=\"{frame}\"}} {count}");
     }
     for (name, samples) in view.latencies.samples() {
-        head(&mut text, format!("{name}_seconds"), "summary", "Latency since this program looks on.");
+        head(&mut text, format!("{name}_seconds"), "summary", "Latency since this program started.");
         let reported = samples.percentiles_ns();
         for (quantile, ns) in
             [(0.5, reported.p50), (0.9, reported.p90), (0.99, reported.p99), (0.999, reported.p999)]

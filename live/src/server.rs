@@ -214,7 +214,7 @@ impl Server {
         let Some(number) = self.asked.pop_front() else { return };
         let (status, text) = match serde_json::from_str(text) {
             Ok(Answer { ok: true, text }) if text.is_empty() => {
-                (Status::Good, "the emulator obeys".to_owned())
+                (Status::Good, "accepted by the emulator".to_owned())
             }
             Ok(Answer { ok: true, text }) => (Status::Good, text),
             Ok(Answer { ok: false, text }) => (Status::BadRequest, text),
@@ -293,7 +293,7 @@ impl Server {
     fn serve(&mut self, place: usize, request: &Request, now_ms: u64) {
         let is_for_us = request.host.as_deref().is_some_and(|host| is_ours(host, self.address.port()));
         if !is_for_us {
-            let why = "ask by the address that was printed: this server goes by no other name";
+            let why = "unknown Host header: use the address that was printed";
             return self.clients[place].answer(message_response(Status::Forbidden, why), now_ms);
         }
         if request.path == "/api/control" {
@@ -347,7 +347,7 @@ impl Server {
             return Some(message_response(Status::MethodNotAllowed, "orders come by POST"));
         }
         let Some(token) = &self.token else {
-            let why = "this page only looks on: it was started without --control";
+            let why = "this page is read-only: it was started without --control";
             return Some(message_response(Status::Forbidden, why));
         };
         // Browsers send the origin of a request; programs send none and need the token too.
@@ -375,7 +375,7 @@ impl Server {
                 let asked = self.view.wire.hand_set_point(axis, position_m, force_n);
                 Some(match asked {
                     Some(asked) => self.send(&Frame::HandSetPoint(asked), now_ms),
-                    None => message_response(Status::Busy, "no controller of this axis is heard"),
+                    None => message_response(Status::Busy, "no frames of this axis's controller arrive"),
                 })
             }
             Order::Line(line) => {
@@ -387,7 +387,7 @@ impl Server {
                     self.asked.push_back(number);
                     return None;
                 }
-                let why = "no emulator listens: start it with --telemetry and --console";
+                let why = "no emulator is connected: start it with --telemetry and --console";
                 Some(message_response(Status::Busy, why))
             }
             Order::Save(seconds) => self.save(number, seconds),

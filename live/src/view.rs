@@ -88,8 +88,8 @@ impl View {
             }
             Packet::Loss(records) => {
                 self.records_lost = records;
-                let text = format!("{records} records of the telemetry did not come here");
-                self.warn(&format!("{text}: what is broken and how much was skipped may be out of date"));
+                let text = format!("{records} telemetry records were lost on the way");
+                self.warn(&format!("{text}: active faults and counts of skipped cycles may be out of date"));
             }
             Packet::Answer(_) => {}
         }
@@ -451,6 +451,6 @@ mod tests {
         view.packet(Packet::Loss(7));
         let message = &state(&view)["messages"][0];
         assert_eq!(message["level"], "warning");
-        assert!(message["text"].as_str().unwrap().starts_with("7 records"), "{message}");
+        assert!(message["text"].as_str().unwrap().starts_with("7 telemetry records"), "{message}");
     }
 }

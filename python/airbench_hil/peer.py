@@ -214,8 +214,8 @@ def _stamp_s(ancillary: list[tuple[int, int, Any]]) -> float:
 def cycles(peer: Peer) -> Iterator[tuple[int, list[Frame]]]:
     """Takes part in the barrier: yields (cycle, frames) and says done when asked for the next. Ends when the host is gone.
 
-    A peer that has joined and is not done within 5 s of wall time ends the run of all. Raises LockstepTimeout, and BusError for a
-    bus without a barrier, where frames come and no cycle ends.
+    A peer that has joined and is not done within the time of --lockstep-timeout ends the run of all. Raises LockstepTimeout,
+    and BusError for a bus without a barrier, where frames come and no cycle ends.
     """
     frames: list[Frame] = []
     while True:

@@ -92,7 +92,7 @@ pub fn run(
         .descriptor(0)
         .and_then(|_| Caller::new(here).read_array::<4>(&raw const here as u64));
     if let Err(error @ (Errno::PERM | Errno::ACCESS | Errno::NOSYS)) = looked {
-        return Err(GuestError::Looking(error.into()));
+        return Err(GuestError::ProcessAccess(error.into()));
     }
     let (report, reports) = channel();
     // Dropped when this function returns.

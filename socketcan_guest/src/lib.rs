@@ -101,7 +101,7 @@ pub enum GuestError {
          it, as docker run --cap-add SYS_PTRACE does, or --security-opt seccomp=unconfined, or systemd-nspawn \
          --system-call-filter=pidfd_getfd; Linux 5.6 or later is needed"
     )]
-    Looking(io::Error),
+    ProcessAccess(io::Error),
     /// The program cannot be started.
     #[error("cannot start the command {}: {error}", name.display())]
     Command {

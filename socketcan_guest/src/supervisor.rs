@@ -421,7 +421,7 @@ impl Supervisor {
         if messages > 0 {
             self.refused_late += messages;
             self.warn_once(
-                "the program has ended and a bus does not take what was written last; it is dropped",
+                "the program has ended and a bus accepts no more frames; the unsent ones are dropped",
             );
         }
     }

@@ -272,7 +272,7 @@ impl Supervisor {
         if forgotten > 0 {
             self.refused_late += forgotten;
             self.warn_once(
-                "nobody answers an ISO-TP message of a closed socket; those behind it are dropped",
+                "no peer answers an ISO-TP message of a closed socket; the messages queued behind it are dropped",
             );
         }
     }

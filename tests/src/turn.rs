@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 /// What a controller says that was left without a processor for too long (`axis/src/chains/fault.rs`); `scripts/vm/job-functions`
 /// knows the same.
-pub const LATENESS: [&str; 3] = ["missed its time", "fell silent", "did not come to rest"];
+pub const LATENESS: [&str; 3] = ["exceeded its time limit", "fell silent", "did not come to rest"];
 
 /// The machine, as long as it is held.
 pub struct MachineLock {

@@ -161,7 +161,7 @@ fn parts_that_are_not_whole_or_not_ours_are_told_and_never_merged() {
     let good = fs::read_to_string(&path).expect("a part");
     let merge = || place.run("merge", &["whole"]).expect_code(BAD_INPUT);
     for (bad, words) in [
-        (good[..good.len() / 2].to_owned(), "makes this part anew"),
+        (good[..good.len() / 2].to_owned(), "makes this part and the missing ones"),
         (good.replace("made by ", "made by 0123"), "another version"),
         (good.replace("campaign ", "campaign 0123"), "another campaign"),
         (good.replacen("\n4,", "\n5,", 1), "not as it was written"),
@@ -187,7 +187,7 @@ fn a_full_disk_loses_nothing_that_is_done() {
     let _ = place
         .run("run", &["--out", &out])
         .expect_code(BAD_INPUT)
-        .expect_stderr(&["make room and start again"]);
+        .expect_stderr(&["free disk space and run the same command"]);
     let done = place.parts("disk/out");
     assert!(done > 0, "nothing was written before the disk was full");
     // Elsewhere the same goes on from what the full disk holds.
@@ -269,7 +269,7 @@ fn the_page_is_whole_and_asks_for_nothing_from_elsewhere() {
     );
     let document = document.expect("well-formed");
     let repeat = format!("scripts/campaign repeat {} ", place.path("c.toml").display());
-    for words in ["How the runs ended", "Over what they change", "Worst cases", &repeat] {
+    for words in ["How the runs ended", "Medians over the varied values", "Worst cases", &repeat] {
         assert!(page.contains(words), "'{words}' is missing");
     }
     for node in document.descendants() {

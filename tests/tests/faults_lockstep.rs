@@ -16,7 +16,7 @@ fn a_member_that_is_never_done_ends_the_run_by_its_name() {
     emulator
         .wait()
         .expect_code(LOCKSTEP_TIMEOUT)
-        .expect_stderr(&["lockstep: 'controller' was not done within 5 s of wall time"]);
+        .expect_stderr(&["lockstep: 'controller' was not done within the time of --lockstep-timeout"]);
     expect_complete(&scene);
     controller.signal(Signal::CONT);
     let code = controller.wait().code;

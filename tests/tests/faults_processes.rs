@@ -53,7 +53,7 @@ fn an_emulator_that_is_killed_and_restarted_is_found_again_and_the_chain_starts_
     emulator.kill();
     controller.wait_for("the bus is gone");
     let second = scene.emulator(Pace::Real).out(&scene.path("second")).start();
-    controller.wait_for("the rig started anew; starting over");
+    controller.wait_for("the rig restarted; starting over");
     second.wait().expect_code(0).expect_stderr(&["the controllers are done"]);
     controller.wait().expect_code(0);
     let report = scene.report();

@@ -73,7 +73,7 @@ fn what_was_named_is_held_against_the_seal() {
     let many = [&skews[..], std::slice::from_ref(&other)].concat().join(", ");
     let cases = [
         (named("piston-leakage", ""), 0, "\n  right\n"),
-        (named("valve-offset", &other), 0, "right, among those"),
+        (named("valve-offset", &other), 0, "right, within the set"),
         (named("valve-offset", &many), 1, "wrong, it is one of too many"),
         (named("valve-offset", ""), 1, "\n  wrong\n"),
         (nothing, 1, "named: nothing (nothing-missing)"),

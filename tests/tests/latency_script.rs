@@ -25,7 +25,7 @@ fn arguments_that_cannot_be_used_are_refused_before_anything_is_built() {
         (&["--seconds", "1.5"], "whole number"),
         (&["--priority", "99"], "from 2 to 98"),
         (&["--spin-us", "1000"], "from 0 to 999"),
-        (&["--cpu", "4711"], "CPU 4711 is not there"),
+        (&["--cpu", "4711"], "may not use CPU 4711"),
         (&["--bus", "vcan0"], "can://IFACE"),
         (&["--experiment", "nothing-of-this-name"], "scripts/run --list"),
         (&["--bounds", "/nowhere.toml"], "cannot be read"),

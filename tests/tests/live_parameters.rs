@@ -113,7 +113,7 @@ fn a_number_edited_while_running_is_taken_over_and_a_bad_edit_changes_nothing() 
         ("gain_per_s = 20.0", "gain_per_s = 900.0", "gain_per_s = 900"),
         ("gain_per_s = 20.0", "gain_per_s = nan", "gain_per_s = NaN"),
         ("gain_per_s = 20.0", "gain_per_s = = 5", "program.toml"),
-        ("\"position-p\"", "\"position-pid\"", "another algorithm needs another start"),
+        ("\"position-p\"", "\"position-pid\"", "a change of the algorithm needs a restart"),
     ] {
         let before = controller.stderr().matches("the numbers in use stay").count();
         edit(&scene, from, to);

@@ -44,7 +44,7 @@ fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the
     let scene = scene();
     own::failing(&scene, "count > 200 && ready->set_velocity_m_per_s > 0.1", &[]);
     let ended = run(&scene).expect_code(1);
-    ended.expect_stderr(&["stopped before the end: drive: controller-fault", "gave no number"]);
+    ended.expect_stderr(&["stopped before the end: drive: controller-fault", "returned NaN or infinity"]);
     let table = scene.axis_table("drive");
     let (velocity, enabled) = (table.numbers("set_velocity_m_per_s"), table.numbers("enabled"));
     let failed = velocity.iter().position(|velocity| *velocity > 0.1).expect("it got that far");
@@ -88,7 +88,7 @@ fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
-    ended.expect_stderr(&["drive: controller-fault", "missed its time"]);
+    ended.expect_stderr(&["drive: controller-fault", "exceeded its time limit"]);
     let table = scene.axis_table("drive");
     let state = table.texts("main_chain")[table.first("main_chain", "fault", 0) - 1];
     assert_eq!(state, "initial-positioning", "latched where it became slow");

@@ -61,7 +61,7 @@ faults! {
     LimitExceeded "limit-exceeded" LimitExceeded:
         "this axis's force or a chamber's pressure was beyond its sensor's range for half a second: look for a \
          blocked axis, too high a supply, or a broken sensor",
-    ControllerFault "controller-fault" ControllerFault: "the algorithm gave no number or missed its time",
+    ControllerFault "controller-fault" ControllerFault: "the algorithm returned NaN or infinity, or exceeded its time limit",
 }
 
 impl Fault {

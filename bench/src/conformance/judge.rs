@@ -20,7 +20,7 @@ const LOSS_WITHIN_CYCLES: u64 = 70;
 /// Largest age of most commands: sensors are answered before the next ones, or one cycle late.
 const USUAL_AGE_CYCLES: u64 = 1;
 /// Share of the commands that a check on most of them requires.
-const MOST: f64 = 0.99;
+const JUDGED_QUANTILE: f64 = 0.99;
 
 pub(super) struct Phase<'a> {
     /// Cycles whose sensors were sent, with their stamps; `None` where this process disturbed the timing.
@@ -119,7 +119,7 @@ fn command_age(phase: &Phase<'_>) -> Case {
         }
     }
     ages.sort_unstable();
-    let (most, oldest) = (quantile(&ages, MOST), ages.last().copied());
+    let (most, oldest) = (quantile(&ages, JUDGED_QUANTILE), ages.last().copied());
     let holds = never_sent == 0
         && most.is_some_and(|age| age <= USUAL_AGE_CYCLES)
         && oldest.is_some_and(|age| age <= STALE_AFTER_CYCLES);
@@ -141,9 +141,9 @@ fn identifiers(phase: &Phase<'_>) -> Case {
     });
     let (first, more) = (others.next(), others.count());
     let detail = match first {
-        None => "nothing but frames that are its own in rig.dbc".into(),
+        None => "only frames whose sender in rig.dbc is this controller".into(),
         Some(frame) => {
-            format!("{} frames that are malformed or another's to send, the first {frame}", more + 1)
+            format!("{} frames that are malformed or of another sender, the first {frame}", more + 1)
         }
     };
     case("regular", "identifiers", kept(first.is_none()), detail)
@@ -179,8 +179,8 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
     let us = |ns: Option<u64>| ns.map_or("none".into(), |ns| format!("{:.1}", ns as f64 / 1000.0));
     let mean_ns = (!periods.is_empty()).then(|| periods.iter().sum::<u64>() / periods.len() as u64);
     let disturbed = phase.cycles.iter().filter(|(_, stamp)| stamp.is_none()).count();
-    let left_out = format!("{disturbed} cycles left out, in which this machine held the check up");
-    let spread = quantile(&spreads, MOST);
+    let left_out = format!("{disturbed} cycles left out, in which the machine delayed the check");
+    let spread = quantile(&spreads, JUDGED_QUANTILE);
     let cycle_time = format!(
         "mean {} us, 99 % within {} us of 1 ms ({} are allowed), largest deviation {} us; {left_out}",
         us(mean_ns),
@@ -188,7 +188,7 @@ fn timing(phase: &Phase<'_>, arguments: &ConformanceArguments) -> [Case; 2] {
         arguments.spread_us,
         us(spreads.last().copied())
     );
-    let response = quantile(&responses, MOST);
+    let response = quantile(&responses, JUDGED_QUANTILE);
     let answered = format!(
         "from sensors to command: median {} us, 99 % within {} us ({} are allowed), longest {} us; {left_out}",
         us(quantile(&responses, 0.5)),
@@ -254,9 +254,10 @@ pub(super) fn sensor_loss(received: &[ReceivedFrame], window: Range<u64>, back: 
                 received.cycle - window.start + 1
             ),
         ),
-        None => {
-            (CheckResult::Skipped, "tripped no emergency stop: the rig asks for none, a partner may".into())
-        }
+        None => (
+            CheckResult::Skipped,
+            "did not trip the emergency stop: the rig does not require it, a partner may".into(),
+        ),
     };
     vec![
         valve_shut(class, received, window.clone(), LOSS_WITHIN_CYCLES),

@@ -26,11 +26,12 @@ const DISTURBED_ABOVE: Duration = Duration::from_micros(100);
 /// Time within which members must join the barrier.
 const JOIN_TIMEOUT: Duration = Duration::from_secs(30);
 
-/// Why a cycle was not completed. Reports print it by `Debug`.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// Why a cycle was not completed.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(super) enum ExchangeError {
-    /// Lockstep: a member did not answer within the time-out of the barrier.
+    #[error("{0} did not answer within the time-out of the barrier")]
     TimedOut(String),
+    #[error("no controller is in the barrier")]
     NobodyThere,
 }
 

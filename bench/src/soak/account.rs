@@ -299,7 +299,7 @@ fn check_rows(rows: &[Row], broken: &mut Vec<String>, gaps_broken: &mut Vec<Stri
         let Row { id, sender, receiver, sent, received, .. } = row;
         if row.missing() != i128::from(row.explained()) {
             broken.push(format!(
-                "{id}: {sender} sent {sent}, {receiver} received {received}, {} lost or not there for it",
+                "{id}: {sender} sent {sent}, {receiver} received {received}, {} explained by losses or absence",
                 row.explained()
             ));
         }

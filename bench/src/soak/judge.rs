@@ -161,9 +161,12 @@ fn records(evidence: &SegmentFiles, outcome: &Outcome) -> Check {
         }
         Ok(_) => {}
     }
-    let bytes = outcome.memory.values().map(Vec::len).max().unwrap_or(0);
+    let samples = outcome.memory.values().map(Vec::len).max().unwrap_or(0);
     result("records", &broken, || {
-        format!("bus.log holds all {} frames of the rig, {bytes} looks at the processes", counted.total())
+        format!(
+            "bus.log holds all {} frames of the rig, {samples} memory samples of a process",
+            counted.total()
+        )
     })
 }
 

@@ -15,10 +15,10 @@ use serde::{Deserialize, Serialize};
 pub(super) const SHORTEST_SEGMENT_S: f64 = 8.0;
 /// Default length of a segment, s.
 const USUAL_SEGMENT_S: f64 = 300.0;
-/// Least number of segments of a soak: one of each way.
-const WAYS: u32 = 4;
+/// Least number of segments of a soak: one of each condition.
+const CONDITIONS: u32 = 4;
 /// Time of a segment without a run of the rig, s: starting, ending, reading its files.
-const AROUND_S: f64 = 2.5;
+const SEGMENT_OVERHEAD_S: f64 = 2.5;
 
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SegmentSpec {
@@ -46,7 +46,7 @@ impl Plan {
     pub(super) fn segment(&self, number: u32) -> SegmentSpec {
         let place = number - 1;
         let count = self.experiments.len() as u32;
-        let way = (place + place / least_common_multiple(count, WAYS)) % WAYS;
+        let way = (place + place / least_common_multiple(count, CONDITIONS)) % CONDITIONS;
         SegmentSpec {
             number,
             experiment: self.experiments[(place % count) as usize].clone(),
@@ -74,14 +74,14 @@ impl SegmentSpec {
 
 /// Length of a segment including start and end, for a soak of `planned_s`.
 pub(super) fn segment_s(asked_s: Option<f64>, planned_s: f64) -> f64 {
-    asked_s.unwrap_or_else(|| (planned_s / f64::from(WAYS)).clamp(SHORTEST_SEGMENT_S, USUAL_SEGMENT_S))
+    asked_s.unwrap_or_else(|| (planned_s / f64::from(CONDITIONS)).clamp(SHORTEST_SEGMENT_S, USUAL_SEGMENT_S))
 }
 
 /// Run time of the rig in the next segment, of length `segment_s`; `None` when too little of the soak is left.
 pub(super) fn rig_s(segment_s: f64, left_s: f64) -> Option<f64> {
     // The last segment is longer or shorter than the others instead of a remainder of its own.
     let with_rest = if left_s < segment_s + SHORTEST_SEGMENT_S { left_s } else { segment_s };
-    (with_rest >= SHORTEST_SEGMENT_S).then(|| ((with_rest - AROUND_S) * 10.0).round() / 10.0)
+    (with_rest >= SHORTEST_SEGMENT_S).then(|| ((with_rest - SEGMENT_OVERHEAD_S) * 10.0).round() / 10.0)
 }
 
 fn least_common_multiple(a: u32, b: u32) -> u32 {
@@ -139,7 +139,7 @@ mod tests {
         let (mut left_s, mut segments) = (180.0, Vec::new());
         while let Some(rig_s) = rig_s(length_s, left_s) {
             segments.push(rig_s);
-            left_s -= rig_s + AROUND_S;
+            left_s -= rig_s + SEGMENT_OVERHEAD_S;
         }
         assert_eq!(segments, [42.5; 4]);
         assert_eq!(segment_s(None, 36_000.0), 300.0);

@@ -73,7 +73,7 @@ pub(super) fn page(soak: &Soak) -> String {
     let _ = writeln!(page, "- experiments: {}", settings.experiments.join(", "));
     let _ = writeln!(page, "- load generator: {}", settings.load.as_deref().unwrap_or("none"));
     let _ = writeln!(page, "- time: {:.1} of {:.1} min", soak.elapsed_s / 60.0, soak.planned_s / 60.0);
-    let ended = soak.ended_because.as_deref().unwrap_or("it goes on, or was killed");
+    let ended = soak.ended_because.as_deref().unwrap_or("still running, or killed");
     let _ = writeln!(page, "- ended because: {ended}");
     let _ = writeln!(page, "- files: {:.0} MB\n", soak.folder_bytes as f64 * 1e-6);
     page.push_str("| distribution | p50 us | p99 us | p99.9 us | p99.99 us | max us | samples |\n");

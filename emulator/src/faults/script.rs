@@ -221,19 +221,19 @@ mod tests {
             (
                 fault,
                 "name = \"valve\"\n",
-                "2: fault 'valve' is unknown; 'emulator faults' lists those that there are, such as valve-",
+                "2: fault 'valve' is unknown; 'emulator faults' lists the known ones, such as valve-",
             ),
             (
                 fault,
                 "name = \"volve-stuck\"\n",
-                "2: fault 'volve-stuck' is unknown; 'emulator faults' lists those that there are",
+                "2: fault 'volve-stuck' is unknown; 'emulator faults' lists the known ones",
             ),
             (
                 fault,
                 "name = \"valve-stuck\"\nat = \"both\"\n",
-                "3: at = 'both': valve-stuck is at one of drive, load",
+                "3: at = 'both': valve-stuck acts at one of drive, load",
             ),
-            (fault, "name = \"valve-stuck\"\n", "1: at = '': valve-stuck is at one of drive, load"),
+            (fault, "name = \"valve-stuck\"\n", "1: at = '': valve-stuck acts at one of drive, load"),
             (offset, "", "1: valve-offset needs offset; allowed: -1 to 1"),
             (offset, "offset = 1.5\n", "4: offset = 1.5: allowed: -1 to 1"),
             (offset, "offset = nan\n", "4: offset = nan: allowed: -1 to 1"),

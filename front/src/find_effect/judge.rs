@@ -54,14 +54,14 @@ pub(super) fn judge(sealed: &str, report: &Report) -> Result<Judgement, FrontErr
         let indistinguishable = alternatives.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
         if indistinguishable && alternatives.len() <= MOST_ALTERNATIVES {
             if verdict == "right" {
-                verdict = "right, among those that this record cannot tell apart";
+                verdict = "right, within the set that this record cannot distinguish";
             }
             continue;
         }
         right = false;
         let unexcited = report.not_excited.iter().any(|effect| hidden.is(&effect.effect, &effect.place));
         verdict = match (indistinguishable, unexcited) {
-            (true, _) => "wrong, it is one of too many that this record cannot tell apart",
+            (true, _) => "wrong, it is one of too many that this record cannot distinguish",
             (false, true) => "wrong, and the report says that this experiment does not excite it",
             (false, false) => "wrong",
         };

@@ -58,7 +58,7 @@ pub enum UrlError {
     )]
     Option(String),
     /// An option that only a wire with a bit rate has.
-    #[error("bus option '{0}' says something of a wire that keeps time: add bitrate=1000000")]
+    #[error("bus option '{0}' needs a bus with a bit rate: add bitrate=1000000")]
     NeedsBitRate(String),
 }
 

@@ -31,7 +31,7 @@ const fn whole(
 }
 
 const PROBABILITY: FaultKey = key("probability", "1", [0.0, 1.0], Some(1.0), "for each frame");
-const SELDOM: FaultKey = key("probability", "1", [0.0, 1.0], Some(0.1), "for each frame");
+const PROBABILITY_TENTH: FaultKey = key("probability", "1", [0.0, 1.0], Some(0.1), "for each frame");
 
 /// The rows of a group: name, places, kind, effect, numbers.
 macro_rules! rows {
@@ -63,7 +63,7 @@ macro_rules! sensor {
                 [key(concat!("offset_", $suffix), $unit, [-$most, $most], None, "added to the value")];
             concat!($quantity, "-sensor-gain"), $places, Kind::Sensor(Channel::$channel, SensorKind::Gain),
                 "an error in proportion to the value",
-                [key("gain", "1", [-10.0, 10.0], None, "shown over true; 1 is sound")];
+                [key("gain", "1", [-10.0, 10.0], None, "shown over true value; 1 is without fault")];
             concat!($quantity, "-sensor-noise"), $places, Kind::Sensor(Channel::$channel, SensorKind::Noise),
                 "Gaussian noise",
                 [key(concat!("noise_", $suffix), $unit, [0.0, $most], Some($small),
@@ -93,7 +93,7 @@ const VALVE: &[FaultSpec] = rows! { Valve {
     "valve-offset", Axis, Kind::ValveOffset, "the valve's zero is off, also in an emergency stop",
         [key("offset", "1", [-1.0, 1.0], None, "added to the command; 1 is fully open")];
     "valve-limited", Axis, Kind::ValveLimited, "the valve opens no further than this",
-        [key("limit", "1", [0.0, 1.0], None, "most opening to either side")];
+        [key("limit", "1", [0.0, 1.0], None, "largest opening to either side")];
     "valve-dead", Axis, Kind::ValveDead, "no command arrives, springs centre the spool: shut", [];
 } };
 
@@ -102,7 +102,7 @@ const SUPPLY: &[FaultSpec] = rows! { Supply {
         [key("drop_pa", "Pa", [0.0, 1e6], None, "how far below the set pressure; no further than the atmosphere"),
             key("time_constant_s", "s", [0.001, 1000.0], Some(0.3), "with which it falls")];
     "supply-loss", Supply, Kind::SupplyLoss,
-        "the supply falls to the atmosphere; the check valves close, and no stop is told on the bus",
+        "the supply falls to the atmosphere; the check valves close, and no emergency stop is sent on the bus",
         [key("time_constant_s", "s", [0.001, 1000.0], Some(0.05), "with which it falls")];
 } };
 
@@ -116,9 +116,9 @@ const AIR: &[FaultSpec] = rows! { Air {
 
 const MECHANICS: &[FaultSpec] = rows! { Mechanics {
     "friction-rise", Axis, Kind::FrictionRise, "break-away, sliding and viscous friction rise together",
-        [key("factor", "1", [0.0, 100.0], None, "all friction times this; 1 is sound")];
+        [key("factor", "1", [0.0, 100.0], None, "all friction times this; 1 is without fault")];
     "mechanical-unlink", Linkage, Kind::Unlink, "the rods part, once; people may link them again", [];
-    "added-mass", Axis, Kind::AddedMass, "something heavy is caught; its weight pulls nowhere",
+    "added-mass", Axis, Kind::AddedMass, "a mass is coupled to the axis; gravity on it has no effect",
         [key("mass_kg", "kg", [0.0, 100.0], None, "moves with the axis, beside the weights of people")];
     "end-stop-hit", Axis, Kind::EndStopHit,
         "the axis is pushed until its piston hits an end of the stroke, and then let go; trapped air may hold it off",
@@ -131,19 +131,19 @@ const BUS: &[FaultSpec] = rows! { Bus {
     "bus-delay", Frames, Kind::Bus(BusKind::Delay), "frames come later, in their order",
         [whole("delay_ms", "ms", [1.0, 10_000.0], 5.0, "by how much")];
     "bus-duplication", Frames, Kind::Bus(BusKind::Duplication), "frames come more than once",
-        [SELDOM, whole("copies", "1", [1.0, 10.0], 1.0, "how often more")];
+        [PROBABILITY_TENTH, whole("copies", "1", [1.0, 10.0], 1.0, "additional copies")];
     "bus-reordering", Frames, Kind::Bus(BusKind::Reordering),
-        "a frame is overtaken by the next one of its identifier", [SELDOM];
+        "a frame is overtaken by the next one of its identifier", [PROBABILITY_TENTH];
     "bus-corruption", Frames, Kind::Bus(BusKind::Corruption),
         "bits of the data are inverted by the sender: CAN's checksum is right, the frame's own is not",
-        [SELDOM, whole("bits", "1", [1.0, 64.0], 1.0, "drawn in each frame and inverted")];
+        [PROBABILITY_TENTH, whole("bits", "1", [1.0, 64.0], 1.0, "drawn in each frame and inverted")];
     "wrong-length", Frames, Kind::Bus(BusKind::WrongLength), "frames are too short or too long",
-        [SELDOM, whole("bytes", "1", [0.0, 8.0], 3.0, "of data instead; cut, or padded with 0")];
+        [PROBABILITY_TENTH, whole("bytes", "1", [0.0, 8.0], 3.0, "of data instead; cut, or padded with 0")];
     "wrong-counter", Counted, Kind::Bus(BusKind::WrongCounter),
         "the counter of sensors or commands is off; the checksum is right",
-        [SELDOM, whole("step", "1", [1.0, 15.0], 5.0, "by how much")];
+        [PROBABILITY_TENTH, whole("step", "1", [1.0, 15.0], 5.0, "by how much")];
     "babbling-node", Bus, Kind::Bus(BusKind::Babbling),
-        "a node more says the same over and over; on a wire with a bit rate it takes the others' time",
+        "an additional node repeats one frame; on a wire with a bit rate it takes the others' time",
         [whole("id", "1", [0.0, 2047.0], 16.0, "its identifier; the lowest wins the bus"),
             key("frames_per_ms", "1/ms", [0.001, 20.0], Some(3.0), "how often"),
             whole("bytes", "1", [0.0, 8.0], 8.0, "of data, all 0")];
