@@ -26,8 +26,8 @@ pub fn of_case(case: &Case) -> Value {
     };
     tell("kind", json!(case.kind));
     tell("axis", case.recipe["axis"].clone());
-    tell("hidden", json!(names(hidden.iter().map(|own| own.effect.to_owned()).collect())));
-    tell("where", json!(names(hidden.iter().map(|own| own.place.to_string()).collect())));
+    tell("hidden", json!(names(hidden.iter().map(|judged| judged.effect.to_owned()).collect())));
+    tell("where", json!(names(hidden.iter().map(|judged| judged.place.to_string()).collect())));
     tell("over_limit", json!(case.over_limit.iter().flatten().copied().reduce(f64::min)));
     tell("called", json!(judgement.called));
     tell("closed", json!(judgement.claimed_joint_ratio));
@@ -43,12 +43,12 @@ pub fn of_case(case: &Case) -> Value {
     let right = match case.kind {
         Kind::Null => !judgement.false_alarm && judgement.error.is_none(),
         Kind::Parameter => judgement.parameter_right,
-        Kind::Single | Kind::Pair | Kind::Triple => hidden.iter().all(|own| own.right),
+        Kind::Single | Kind::Pair | Kind::Triple => hidden.iter().all(|judged| judged.right),
     };
     tell("right", json!(right));
     tell("white", json!(judgement.claimed_white));
     if !hidden.is_empty() {
-        tell("where_right", json!(hidden.iter().all(|own| own.where_right)));
+        tell("where_right", json!(hidden.iter().all(|judged| judged.where_right)));
     }
     if case.kind == Kind::Single {
         tell("alone", json!(judgement.alone));

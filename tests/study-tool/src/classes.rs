@@ -86,10 +86,13 @@ impl Classes {
     /// The size of the noise is ignored: it scales all signatures alike, but for the rounding of the sensors. The strengths are
     /// those at the noise of this study, as the committed limits are.
     pub fn of_draws(&self, draws: &[Draw]) -> BTreeMap<usize, DrawClasses> {
-        let own = self.plan.draws();
-        let recipe_of = |number: usize| own.get(number).map(|draw| &draw.recipe);
-        let by_seed: BTreeMap<u64, &DrawClasses> =
-            self.draws.iter().filter_map(|own| Some((recipe_of(own.number)?.seed, own))).collect();
+        let planned = self.plan.draws();
+        let recipe_of = |number: usize| planned.get(number).map(|draw| &draw.recipe);
+        let by_seed: BTreeMap<u64, &DrawClasses> = self
+            .draws
+            .iter()
+            .filter_map(|classes| Some((recipe_of(classes.number)?.seed, classes)))
+            .collect();
         let of_draw = |draw: &Draw| {
             let known = *by_seed.get(&draw.recipe.seed)?;
             let recipe = recipe_of(known.number)?;
@@ -127,20 +130,20 @@ pub(crate) fn classes_of(draw: &Draw, trajectory: TrueTrajectory) -> Result<Draw
         let place = hidden.place.to_string();
         let numbers: Vec<_> =
             sheet.keys.iter().map(|key| key.name).zip(hidden.numbers.iter().copied()).collect();
-        let own = observer.signature(&rig.with_effect(sheet.name, &place, &numbers)?);
+        let hidden_signature = observer.signature(&rig.with_effect(sheet.name, &place, &numbers)?);
         let other = others.iter().filter(|(effect, at, _)| effect != hidden.name || *at != place);
         let mut members: Vec<_> = other
             .map(|(effect, at, signature)| Member {
                 effect: effect.clone(),
                 place: at.clone(),
                 // Four digits are precise enough, and keep the file small.
-                cosine: (abs_cosine(&own, signature) * 1e4).round() / 1e4,
+                cosine: (abs_cosine(&hidden_signature, signature) * 1e4).round() / 1e4,
             })
             .collect();
         members.sort_by(|left, right| right.cosine.total_cmp(&left.cosine));
         let reported = members.iter().take_while(|member| member.cosine > REPORTED_COSINE).count();
         members.truncate(reported.max(1));
-        let strength = length(&own) / threshold(sheet.keys[0].signed);
+        let strength = length(&hidden_signature) / threshold(sheet.keys[0].signed);
         let effect = hidden.name.to_owned();
         hidden_classes.push(HiddenClass { effect, place, strength, members, nearest: None });
     }
@@ -226,10 +229,10 @@ mod tests {
         let rig = RigParameters::baseline();
         for name in PARAMETERS {
             for factor in [0.85, 1.15] {
-                let own = with_parameter(&rig, name, factor);
+                let off = with_parameter(&rig, name, factor);
                 // The break-away force cannot fall below the sliding force, nor the other way round.
-                assert!(own.is_ok(), "{name} {factor}: {own:?}");
-                assert_ne!(own.unwrap(), rig, "{name}");
+                assert!(off.is_ok(), "{name} {factor}: {off:?}");
+                assert_ne!(off.unwrap(), rig, "{name}");
             }
         }
     }
@@ -244,9 +247,9 @@ mod tests {
         let shape = Shape { each: 2, nulls: 3, pairs: 2, noise_factor: 4.0, ..Shape::SMALL };
         let found = of(1, shape);
         assert_eq!(found.keys().copied().collect::<Vec<_>>(), (0..2 * SHEETS.len()).collect::<Vec<_>>());
-        for (number, own) in &found {
-            assert_eq!(own.number, *number);
-            assert_eq!(own.hidden[0].effect, SHEETS[number / 2].name);
+        for (number, draw) in &found {
+            assert_eq!(draw.number, *number);
+            assert_eq!(draw.hidden[0].effect, SHEETS[number / 2].name);
         }
         assert_eq!(found[&3].hidden, classes.draws[7].hidden);
         assert!(of(5, shape).is_empty());

@@ -145,12 +145,12 @@ fn parts(scores: &[Score], of: impl Fn(&Score) -> &Vec<Split>) -> Vec<Row> {
         name: split.name.clone(),
         cells: scores
             .iter()
-            .map(|score| of(score).get(at).map_or(String::new(), |own| reported(&own.class_right)))
+            .map(|score| of(score).get(at).map_or(String::new(), |part| reported(&part.class_right)))
             .collect(),
         wanted: String::new(),
     };
     let any =
-        |at: usize| scores.iter().any(|score| of(score).get(at).is_some_and(|own| own.class_right.of > 0));
+        |at: usize| scores.iter().any(|score| of(score).get(at).is_some_and(|part| part.class_right.of > 0));
     splits.iter().enumerate().filter(|(at, _)| any(*at)).map(row).collect()
 }
 

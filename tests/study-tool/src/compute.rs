@@ -48,16 +48,16 @@ pub(crate) fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory
     let (both, axis) = (record.recipe.both_axes, record.recipe.axis);
     let row = &record.rows[0];
     let state_of = |i: usize| {
-        let own = &row.axes[i];
+        let true_axis = &row.axes[i];
         let volume = |area_m2: f64, way_m: f64| rig.cylinder().dead_volume_m3 + area_m2 * way_m;
         let cylinder = rig.cylinder();
         AxisState {
-            extension_m: own.extension_m.clamp(0.0, cylinder.stroke_m),
+            extension_m: true_axis.extension_m.clamp(0.0, cylinder.stroke_m),
             rod_velocity_m_per_s: 0.0,
             spool: 0.0,
-            stored_air_a_j: own.pressure_pa[0] * volume(cylinder.piston_area_m2, own.extension_m),
-            stored_air_b_j: own.pressure_pa[1]
-                * volume(cylinder.annulus_area_m2, cylinder.stroke_m - own.extension_m),
+            stored_air_a_j: true_axis.pressure_pa[0] * volume(cylinder.piston_area_m2, true_axis.extension_m),
+            stored_air_b_j: true_axis.pressure_pa[1]
+                * volume(cylinder.annulus_area_m2, cylinder.stroke_m - true_axis.extension_m),
             flow_a_m3_per_s: 0.0,
             flow_b_m3_per_s: 0.0,
         }
@@ -69,7 +69,7 @@ pub(crate) fn trajectory(record: &Record, rig: &RigParameters) -> TrueTrajectory
     };
     TrueTrajectory {
         rig: rig.clone(),
-        measured: Axis::ALL.map(|own| both || own == axis),
+        measured: Axis::ALL.map(|each| both || each == axis),
         start: State {
             axes: [state_of(0), state_of(1)],
             supply_pressure_pa: rig.supply().pressure_pa,

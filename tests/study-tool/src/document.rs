@@ -18,8 +18,8 @@ pub fn limit_table(limits: &Limits) -> String {
         let key = &sheet.keys[0];
         let drawn =
             format!("{} to {}{}", key.drawn[0], key.drawn[1], if key.signed { ", either sign" } else { "" });
-        let own = limits.limits.iter().filter(|limit| limit.effect == sheet.name);
-        for limit in own.filter(|limit| !limit.place.starts_with("load")) {
+        let of_effect = limits.limits.iter().filter(|limit| limit.effect == sheet.name);
+        for limit in of_effect.filter(|limit| !limit.place.starts_with("load")) {
             let _ = writeln!(
                 table,
                 "| {} {} | {} | {} | {} | {drawn} | {} | {} |",

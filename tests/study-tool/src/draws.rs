@@ -188,8 +188,9 @@ struct Generator(Pcg64);
 impl Generator {
     fn new(seed: u64, stream: u64, repetition: u32) -> Self {
         // An odd factor separates seeds; `seed_from_u64` spreads neighbours over the whole state.
-        let own = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(stream << 32 | u64::from(repetition));
-        Generator(Pcg64::seed_from_u64(own))
+        let stream_seed =
+            seed.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(stream << 32 | u64::from(repetition));
+        Generator(Pcg64::seed_from_u64(stream_seed))
     }
 
     fn share(&mut self) -> f64 {
@@ -244,7 +245,7 @@ impl Generator {
                 sheets.push(sheet);
             }
         }
-        let at = |place: &&Place| axis_of(**place).is_none_or(|own| own == axis);
+        let at = |place: &&Place| axis_of(**place).is_none_or(|of_place| of_place == axis);
         let both_axes = sheets.iter().any(|sheet| needs_both_axes(sheet.place));
         let mut hidden = Vec::new();
         for sheet in sheets {
@@ -344,20 +345,20 @@ mod tests {
         let whole = Shape { each: 4, nulls: 1, parameters: 0, pairs: 2, triples: 0, ..Shape::default() };
         let weak = Shape { weaker_factor: 30.0, ..whole };
         for (strong, weak) in draws(3, &whole).iter().zip(draws(3, &weak)) {
-            for (own, other) in strong.recipe.hidden.iter().zip(&weak.recipe.hidden) {
-                let key = &plant::effects::sheet(own.name).unwrap().keys[0];
+            for (stronger, weaker) in strong.recipe.hidden.iter().zip(&weak.recipe.hidden) {
+                let key = &plant::effects::sheet(stronger.name).unwrap().keys[0];
                 let excursion = |value| Scale::of(key).iter().find_map(|scale| scale.excursion(value));
-                let [strong, weak] = [own, other].map(|hidden| excursion(hidden.numbers[0]));
+                let [strong, weak] = [stronger, weaker].map(|hidden| excursion(hidden.numbers[0]));
                 // A file takes no spool that is faster than its largest number: there it stays.
-                let held = [key.min, key.max].contains(&other.numbers[0].abs());
+                let held = [key.min, key.max].contains(&weaker.numbers[0].abs());
                 let ratio = strong.zip(weak).map(|(strong, weak)| strong / weak);
                 assert!(
                     ratio.is_none_or(|ratio| held || (ratio - 30.0).abs() < 1e-9),
                     "{}: {ratio:?}",
-                    own.name
+                    stronger.name
                 );
-                assert_eq!(own.numbers[0].is_sign_positive(), other.numbers[0].is_sign_positive());
-                assert_eq!(own.numbers[1..], other.numbers[1..]);
+                assert_eq!(stronger.numbers[0].is_sign_positive(), weaker.numbers[0].is_sign_positive());
+                assert_eq!(stronger.numbers[1..], weaker.numbers[1..]);
             }
             assert_eq!(strong.recipe, Recipe { hidden: strong.recipe.hidden.clone(), ..weak.recipe });
         }

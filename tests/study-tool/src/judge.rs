@@ -212,9 +212,9 @@ fn matching<'a>(
         at: usize,
         used: u64,
     ) -> (usize, Vec<(&'a Named, usize)>) {
-        let Some(own) = options.get(at) else { return (0, Vec::new()) };
+        let Some(row) = options.get(at) else { return (0, Vec::new()) };
         let mut best = assign(options, at + 1, used);
-        for (entry, option) in own.iter().enumerate().take(64) {
+        for (entry, option) in row.iter().enumerate().take(64) {
             let Some((name, place)) = option else { continue };
             if used & (1 << entry) == 0 {
                 let (worth, mut rest) = assign(options, at + 1, used | 1 << entry);
@@ -230,10 +230,10 @@ fn matching<'a>(
     let options: Vec<Vec<_>> = hidden
         .iter()
         .enumerate()
-        .map(|(at, own)| {
+        .map(|(at, effect)| {
             let option = |entry| {
-                let name = stands_for(entry, report, own, class(at), hidden.len() == 1)?;
-                Some((name, place_right(name, own, class(at))))
+                let name = stands_for(entry, report, effect, class(at), hidden.len() == 1)?;
+                Some((name, place_right(name, effect, class(at))))
             };
             report.named.iter().map(option).collect()
         })
@@ -242,11 +242,12 @@ fn matching<'a>(
 }
 
 fn judge_hidden(hidden: &Hidden, class: &[Member], name: Option<&Named>) -> HiddenJudgement {
-    let own = name.filter(|name| name.sheet.name == hidden.name && name.place == hidden.place);
+    let exact = name.filter(|name| name.sheet.name == hidden.name && name.place == hidden.place);
     let keys = plant::effects::sheet(hidden.name).map_or(&[][..], |sheet| sheet.keys);
     let mut numbers = Vec::new();
     for (at, (key, truth)) in keys.iter().zip(&hidden.numbers).enumerate() {
-        let reported = own.and_then(|name| name.parameters.iter().find(|reported| reported.name == key.name));
+        let reported =
+            exact.and_then(|name| name.parameters.iter().find(|reported| reported.name == key.name));
         // A number in another unit does not count as reported; relative to a true 0 there is no error.
         let Some(reported) = reported.filter(|reported| reported.unit == key.unit.name() && *truth != 0.0)
         else {

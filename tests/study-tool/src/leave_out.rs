@@ -67,7 +67,7 @@ pub(crate) struct LeaveOutJudgement {
 /// Names of the effects to leave out for a draw: the hidden ones, and all of their classes.
 pub fn left_out(draw: &Draw, classes: Option<&DrawClasses>) -> Vec<String> {
     let hidden = draw.recipe.hidden.iter().map(|hidden| hidden.name.to_owned());
-    let members = classes.into_iter().flat_map(|classes| &classes.hidden).flat_map(|own| &own.members);
+    let members = classes.into_iter().flat_map(|classes| &classes.hidden).flat_map(|class| &class.members);
     let twins = members.filter(|member| member.is_twin()).map(|member| member.effect.clone());
     hidden.chain(twins).collect::<BTreeSet<_>>().into_iter().collect()
 }
@@ -90,12 +90,14 @@ pub(crate) fn judge(
     let located = report.and_then(|report| report.dependence.as_ref()).filter(|_| outside.is_none());
     let balance =
         outside.map(|outside| &outside.balance).or(located.map(|located| &located.balance)).cloned();
-    let of_outside = outside.iter().flat_map(|outside| &outside.variables).map(|own| own.variable.clone());
-    let of_located = located.iter().flat_map(|located| &located.variables).map(|own| own.variable.clone());
+    let of_outside =
+        outside.iter().flat_map(|outside| &outside.variables).map(|reported| reported.variable.clone());
+    let of_located =
+        located.iter().flat_map(|located| &located.variables).map(|reported| reported.variable.clone());
     let variables: Vec<String> = of_outside.chain(of_located).collect();
     let balance_right = |place: Place| Some(is_expected(balance.as_ref()?, place, &expected?.balances));
-    let variable_right = expected.is_some_and(|own| {
-        variables.iter().take(COUNTED_VARIABLES).any(|reported| own.variables.contains(reported))
+    let variable_right = expected.is_some_and(|expectation| {
+        variables.iter().take(COUNTED_VARIABLES).any(|reported| expectation.variables.contains(reported))
     });
     LeaveOutJudgement {
         without: without.to_vec(),
@@ -114,10 +116,10 @@ pub(crate) fn judge(
 fn is_expected(balance: &str, place: Place, expected: &[String]) -> bool {
     let (axis, name) = balance.split_once('.').map_or((None, balance), |(axis, name)| (Some(axis), name));
     let on_axis = match (axis, axis_of(place)) {
-        (Some(reported), Some(own)) => reported == own.name(),
+        (Some(reported), Some(of_place)) => reported == of_place.name(),
         _ => true,
     };
-    on_axis && expected.iter().any(|own| own == name)
+    on_axis && expected.iter().any(|expected_name| expected_name == name)
 }
 
 #[cfg(test)]

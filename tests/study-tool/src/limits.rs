@@ -141,12 +141,12 @@ impl Limits {
     /// Ratio of the excursion of an amplitude to that of its limit: 0 when no amplitude is detected, `None` when every one is.
     pub(crate) fn ratio(&self, sheet: &Sheet, place: Place, amplitude: f64) -> Option<f64> {
         Scale::of(&sheet.keys[0]).into_iter().find_map(|scale| {
-            let own = scale.excursion(amplitude)?;
+            let excursion = scale.excursion(amplitude)?;
             let limit = self.limits.iter().find(|limit| {
                 limit.effect == sheet.name && limit.place == place.to_string() && limit.side == side(scale)
             })?;
             match limit.limit_value {
-                Some(limit_value) => Some(own / scale.excursion(limit_value)?),
+                Some(limit_value) => Some(excursion / scale.excursion(limit_value)?),
                 None => (!limit.excited).then_some(0.0),
             }
         })

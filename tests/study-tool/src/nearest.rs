@@ -52,14 +52,15 @@ pub(crate) struct NearestLaw {
 /// form, as between linked rods. A number that it does not recover there is the drawn one.
 pub(crate) fn nearest_law(draw: &Draw, hidden: &Hidden) -> Result<Option<NearestLaw>, ComputeError> {
     let fitted = |form| fitted(&record(draw, hidden, form)?, hidden);
-    let own = fitted(Form::Catalogue)?;
-    if own.left_share > FAITHFUL_LEFT {
+    let catalogue = fitted(Form::Catalogue)?;
+    if catalogue.left_share > FAITHFUL_LEFT {
         return Ok(None);
     }
     let other = fitted(draw.recipe.form)?;
-    let found = |(own, drawn): (&f64, &f64)| (own / drawn - 1.0).abs() < FAITHFUL;
-    let numbers = own.numbers.iter().zip(&hidden.numbers).zip(&other.numbers);
-    let numbers = numbers.map(|((own, drawn), other)| if found((own, drawn)) { *other } else { *drawn });
+    let found = |(recovered, drawn): (&f64, &f64)| (recovered / drawn - 1.0).abs() < FAITHFUL;
+    let numbers = catalogue.numbers.iter().zip(&hidden.numbers).zip(&other.numbers);
+    let numbers =
+        numbers.map(|((recovered, drawn), other)| if found((recovered, drawn)) { *other } else { *drawn });
     Ok(Some(NearestLaw { numbers: numbers.collect(), ..other }))
 }
 
@@ -119,11 +120,11 @@ impl Iterate for FitPoint {
 impl Fit<'_> {
     /// The rig at some coordinates; `None` where it is refused.
     pub(crate) fn rig_at(&self, coordinates: &[f64]) -> Option<RigParameters> {
-        let (own, deviations) = coordinates.split_at(self.keys());
+        let (effect, deviations) = coordinates.split_at(self.keys());
         let mut all = PARAMETERS.iter().zip(deviations);
         let rig = all
             .try_fold(self.rig.clone(), |rig, (name, deviation)| with_parameter(&rig, name, 1.0 + deviation));
-        self.candidate.rig(&rig.ok()?, own).ok()
+        self.candidate.rig(&rig.ok()?, effect).ok()
     }
 
     fn keys(&self) -> usize {
@@ -203,14 +204,17 @@ mod tests {
         let draws = Plan::new(5, Shape { each: 1, ..Shape::SMALL }).draws();
         let draw = draws.iter().find(|draw| draw.recipe.hidden[0].name == "valve-characteristic").unwrap();
         let hidden = &draw.recipe.hidden[0];
-        let [own, other] = [Form::Catalogue, Form::Near].map(|form| {
+        let [catalogue, other] = [Form::Catalogue, Form::Near].map(|form| {
             let mut record = record(draw, hidden, form).unwrap();
             record.rows.truncate(2000);
             fitted(&record, hidden).unwrap()
         });
         let drawn = hidden.numbers[0];
-        assert!(own.left_share < 0.01 && (own.numbers[0] / drawn - 1.0).abs() < FAITHFUL, "{own:?} {drawn}");
-        assert!(other.left_share > own.left_share && other.left_share < 0.4, "{own:?} {other:?}");
+        assert!(
+            catalogue.left_share < 0.01 && (catalogue.numbers[0] / drawn - 1.0).abs() < FAITHFUL,
+            "{catalogue:?} {drawn}"
+        );
+        assert!(other.left_share > catalogue.left_share && other.left_share < 0.4, "{catalogue:?} {other:?}");
         assert!((other.numbers[0] / drawn - 1.0).abs() > 3.0 * FAITHFUL, "{other:?} {drawn}");
     }
 }

@@ -36,9 +36,13 @@ pub(crate) struct JudgedExplanation {
 
 /// The explanations with the probabilities of the marginal likelihood; `None` where the report has none.
 pub(crate) fn by_marginal(stated: &[JudgedExplanation]) -> Option<Vec<JudgedExplanation>> {
-    let own =
+    let with_marginal =
         |stated: &JudgedExplanation| Some(JudgedExplanation { probability: stated.marginal?, ..*stated });
-    stated.iter().map(own).collect::<Option<Vec<JudgedExplanation>>>().filter(|stated| !stated.is_empty())
+    stated
+        .iter()
+        .map(with_marginal)
+        .collect::<Option<Vec<JudgedExplanation>>>()
+        .filter(|stated| !stated.is_empty())
 }
 
 pub(crate) fn judge(
@@ -60,12 +64,13 @@ pub(crate) fn judge(
     };
     let stated = |explanation: &Explanation| JudgedExplanation {
         probability: explanation.probability,
-        marginal: explanation.marginal.map(|own| own.probability),
+        marginal: explanation.marginal.map(|marginal| marginal.probability),
         right: is_right(explanation),
     };
     let mut judged: Vec<JudgedExplanation> = report.explanations.iter().map(stated).collect();
     let any = judged.iter().any(|stated| stated.right);
-    let fallen = report.explanations.iter().position(|own| own.kind == ExplanationKind::NoneOfThese);
+    let fallen =
+        report.explanations.iter().position(|explanation| explanation.kind == ExplanationKind::NoneOfThese);
     if let Some(none) = fallen.filter(|_| !any) {
         judged[none].right = true;
     }
@@ -78,8 +83,8 @@ fn match_hidden(set: &[EffectPlace], hidden: &[Hidden], classes: &[Vec<Member>])
     (0..hidden.len()).any(|at| {
         let (mut others, mut twins) = (hidden.to_vec(), classes.to_vec());
         twins.resize(hidden.len(), Vec::new());
-        let (own, class) = (others.remove(at), twins.remove(at));
-        is_of_class(&first.effect, &first.place.to_string(), &own, &class)
+        let (effect, class) = (others.remove(at), twins.remove(at));
+        is_of_class(&first.effect, &first.place.to_string(), &effect, &class)
             && match_hidden(&set[1..], &others, &twins)
     })
 }
@@ -233,7 +238,7 @@ mod tests {
         let effect = |hidden: &Hidden| {
             let place = hidden.place.to_string();
             let (axis, element) =
-                place.split_once('.').map_or((&*place, None), |(axis, own)| (axis, Some(own)));
+                place.split_once('.').map_or((&*place, None), |(axis, element)| (axis, Some(element)));
             json!({"effect": hidden.name, "where": {"axis": axis, "element": element}})
         };
         let [one, other] = [&pair.recipe.hidden[0], &pair.recipe.hidden[1]].map(effect);

@@ -125,9 +125,9 @@ pub fn score(folders: &[PathBuf], label: &str, known: ScoreInputs<'_>) -> Result
     let mut without_classes = 0;
     for (study, draw) in places(&studies, label, leave_out, known.partly)? {
         let result = read_result(&study.run(label, draw.number).join("result.json"))?;
-        let own = program.get_or_insert_with(|| result.program.clone());
-        if *own != result.program {
-            let (other, program) = (Box::new(result.program), Box::new(own.clone()));
+        let first_program = program.get_or_insert_with(|| result.program.clone());
+        if *first_program != result.program {
+            let (other, program) = (Box::new(result.program), Box::new(first_program.clone()));
             return Err(ScoreError::Programs { number: draw.number, other, program });
         }
         let classes = classes_of(study, draw, known)?;
@@ -179,8 +179,8 @@ fn places<'a>(
     // With effects left out, only draws of one effect are run.
     let wanted = |draw: &&Draw| !leave_out || draw.kind == Kind::Single;
     for draw in studies.iter().take(1).flat_map(|study| &study.draws).filter(wanted) {
-        let mut own = studies.iter().filter(|study| study.run(label, draw.number).exists());
-        match (own.next(), own.next()) {
+        let mut with_result = studies.iter().filter(|study| study.run(label, draw.number).exists());
+        match (with_result.next(), with_result.next()) {
             (None, _) => missing.push(draw.number),
             (Some(study), None) => places.push((study, draw)),
             (Some(one), Some(other)) => {
@@ -232,9 +232,11 @@ fn case(
         (0..recipe.hidden.len()).map(|at| over_limit(draw, at, classes, known.limits)).collect();
     let twins = recipe.hidden.iter().enumerate().any(|(at, _)| {
         let others = recipe.hidden.iter().enumerate().filter(|(other, _)| *other != at);
-        let own = members.get(at);
+        let class = members.get(at);
         others.into_iter().any(|(_, other)| {
-            own.is_some_and(|own| own.iter().any(|member| member.is_twin() && member.effect == other.name))
+            class.is_some_and(|class| {
+                class.iter().any(|member| member.is_twin() && member.effect == other.name)
+            })
         })
     });
     let clear = over_limit.iter().all(|ratio| ratio.is_some_and(|ratio| ratio >= CLEAR));
@@ -260,11 +262,11 @@ fn case(
         wrong_parameters: !recipe.wrong_parameters.is_empty(),
         coloured_noise: recipe.coloured_noise,
         explanations: good
-            .map_or_else(Vec::new, |own| probability::judge(draw, &members, left_out.is_some(), own)),
+            .map_or_else(Vec::new, |good| probability::judge(draw, &members, left_out.is_some(), good)),
         rig_file_chi2: good
-            .and_then(|own| Some(own.verification.as_ref()?.chi2_before))
+            .and_then(|good| Some(good.verification.as_ref()?.chi2_before))
             .filter(|chi2| chi2.is_finite()),
-        parameter_errors: good.map_or_else(Vec::new, |own| parameters_off(draw, own)),
+        parameter_errors: good.map_or_else(Vec::new, |good| parameters_off(draw, good)),
         judgement,
         left_out,
         wall_s: result.taken.wall_s,
@@ -288,10 +290,11 @@ fn with_nearest_laws(draw: &Draw, classes: Option<&DrawClasses>) -> Draw {
 }
 
 fn parameters_off(draw: &Draw, report: &Report) -> Vec<f64> {
-    let wrong = |name: &str| draw.recipe.wrong_parameters.iter().any(|(own, _)| own == name);
+    let wrong = |name: &str| draw.recipe.wrong_parameters.iter().any(|(parameter, _)| parameter == name);
     // A program that does not state the file's value has still reported the parameter.
-    let off = |own: &Quantity| own.before.map_or(0.0, |before| (own.value / before - 1.0).abs());
-    report.parameters.iter().filter(|own| !wrong(&own.name)).map(off).collect()
+    let off =
+        |quantity: &Quantity| quantity.before.map_or(0.0, |before| (quantity.value / before - 1.0).abs());
+    report.parameters.iter().filter(|quantity| !wrong(&quantity.name)).map(off).collect()
 }
 
 /// Ratio of a hidden effect to its limit.

@@ -111,8 +111,9 @@ impl Observer {
                 let of = |row: &Row| (direction(row.axes[*axis].rod_velocity_m_per_s), touches(row));
                 let near = [at.saturating_sub(1), (at + 1).min(whole - 1)];
                 let jumps = near.iter().any(|near| of(&rows[*near]) != of(row));
-                run.readings
-                    .extend(row.without_noise[*axis].iter().zip(self.noise).map(|(own, noise)| own / noise));
+                run.readings.extend(
+                    row.without_noise[*axis].iter().zip(self.noise).map(|(value, noise)| value / noise),
+                );
                 run.jumps.extend((0..CHANNELS).map(|channel| jumps && channel == FORCE));
             }
         }
@@ -123,10 +124,10 @@ impl Observer {
     pub(crate) fn between(&self, run: &Run, from: &Run) -> Vec<f64> {
         let rows = self.rows();
         let mut differences: Vec<f64> =
-            run.readings.iter().zip(&from.readings).map(|(own, from)| own - from).collect();
+            run.readings.iter().zip(&from.readings).map(|(reading, from)| reading - from).collect();
         let settling = differences.len().min(rows * self.trajectory.settling);
         differences[..settling].fill(0.0);
-        let jumps: Vec<bool> = run.jumps.iter().zip(&from.jumps).map(|(own, from)| *own || *from).collect();
+        let jumps: Vec<bool> = run.jumps.iter().zip(&from.jumps).map(|(jump, from)| *jump || *from).collect();
         for ((difference, jumps), window) in
             differences.chunks_exact_mut(rows).zip(jumps.chunks_exact(rows)).zip(&self.windows)
         {
@@ -180,8 +181,8 @@ impl Observer {
         for (lane, i) in measured().enumerate() {
             phases[i].push(phase(&end, i));
             for at in 0..WINDOW {
-                let own = phases[i][at];
-                let jumps = phases[i][at.saturating_sub(1)] != own || phases[i][at + 1] != own;
+                let current = phases[i][at];
+                let jumps = phases[i][at.saturating_sub(1)] != current || phases[i][at + 1] != current;
                 run.jumps[from + at * width + lane * CHANNELS + FORCE] = jumps;
             }
         }
@@ -203,9 +204,10 @@ impl Observer {
                     .expect("a nudge leaves the rig in a state of its own");
                 let mut perturbed = Run::default();
                 self.read(&mut plant, window, &mut perturbed);
-                sensitivities
-                    .extend(perturbed.readings.iter().zip(baseline).map(|(own, baseline)| own - baseline));
-                jumps.iter_mut().zip(&perturbed.jumps).for_each(|(all, own)| *all |= own);
+                sensitivities.extend(
+                    perturbed.readings.iter().zip(baseline).map(|(reading, baseline)| reading - baseline),
+                );
+                jumps.iter_mut().zip(&perturbed.jumps).for_each(|(all, jump)| *all |= jump);
             }
         }
         let basis = basis(&sensitivities, &jumps);
@@ -224,7 +226,7 @@ impl Window {
     /// Projects the subspace of the initial state out of a difference of readings; those at `jumps` are set to 0.
     fn project(&self, difference: &mut [f64], jumps: &[bool]) {
         let all: Vec<bool> = self.jumps.iter().zip(jumps).map(|(left, right)| *left || *right).collect();
-        difference.iter_mut().zip(&all).filter(|(_, jumps)| **jumps).for_each(|(own, _)| *own = 0.0);
+        difference.iter_mut().zip(&all).filter(|(_, jumps)| **jumps).for_each(|(value, _)| *value = 0.0);
         let more;
         let basis = if all == self.jumps {
             &self.basis
@@ -234,7 +236,7 @@ impl Window {
         };
         for direction in basis {
             let share = dot(difference, direction);
-            difference.iter_mut().zip(direction).for_each(|(own, part)| *own -= share * part);
+            difference.iter_mut().zip(direction).for_each(|(value, part)| *value -= share * part);
         }
     }
 }
@@ -245,11 +247,11 @@ fn basis(columns: &[f64], without: &[bool]) -> Vec<Vec<f64>> {
     let mut kept = Vec::with_capacity(columns.len());
     for column in columns.chunks_exact(rows) {
         let column: Vec<f64> =
-            column.iter().zip(without).map(|(own, without)| if *without { 0.0 } else { *own }).collect();
+            column.iter().zip(without).map(|(value, without)| if *without { 0.0 } else { *value }).collect();
         // Columns are normalised, since their scale would decide the rank.
         let length = length(&column);
         if length > 0.0 {
-            kept.extend(column.iter().map(|own| own / length));
+            kept.extend(column.iter().map(|value| value / length));
         }
     }
     if kept.is_empty() {
@@ -276,15 +278,15 @@ fn at_true_state(plant: &Plant, points: &[Point; 2]) -> State {
     let mut state = *plant.state();
     let truth = plant.truth(&Inputs::default());
     let cylinder = plant.rig().cylinder();
-    for ((own, point), axis) in state.axes.iter_mut().zip(points).zip(&truth.axes) {
-        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - own.extension_m;
+    for ((axis_state, point), axis) in state.axes.iter_mut().zip(points).zip(&truth.axes) {
+        let way_m = point.extension_m.clamp(0.0, cylinder.stroke_m) - axis_state.extension_m;
         // The volumes are those of this plant: an effect may have changed them.
         let volume_a = axis.stored_air_a_j / axis.pressure_a_pa + cylinder.piston_area_m2 * way_m;
         let volume_b = axis.stored_air_b_j / axis.pressure_b_pa - cylinder.annulus_area_m2 * way_m;
-        own.extension_m += way_m;
-        own.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
-        own.stored_air_a_j = point.pressures_pa[0] * volume_a;
-        own.stored_air_b_j = point.pressures_pa[1] * volume_b;
+        axis_state.extension_m += way_m;
+        axis_state.rod_velocity_m_per_s = point.rod_velocity_m_per_s;
+        axis_state.stored_air_a_j = point.pressures_pa[0] * volume_a;
+        axis_state.stored_air_b_j = point.pressures_pa[1] * volume_b;
     }
     state
 }

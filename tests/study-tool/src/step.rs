@@ -270,14 +270,14 @@ fn keep(out: &Path, folder: &Path, name: &str, largest: u64) -> io::Result<()> {
 
 pub(crate) fn check_program(
     path: &Path,
-    own: &Identity,
+    recorded: &Identity,
     identity: &Identity,
     advice: &str,
 ) -> Result<(), FolderError> {
-    if own == identity {
+    if recorded == identity {
         return Ok(());
     }
-    let what = format!("is of another program ({own:?}) than this one ({identity:?}): {advice}");
+    let what = format!("is of another program ({recorded:?}) than this one ({identity:?}): {advice}");
     Err(FolderError::content(path, what))
 }
 

@@ -76,7 +76,9 @@ fn is_exact(case: &Case) -> bool {
         Kind::Single => judgement.alone && hidden(case).where_right,
         Kind::Null => is_no_name(case),
         Kind::Parameter => judgement.parameter_right,
-        Kind::Pair | Kind::Triple => judgement.hidden.iter().all(|own| own.right) && judgement.too_many == 0,
+        Kind::Pair | Kind::Triple => {
+            judgement.hidden.iter().all(|judged| judged.right) && judgement.too_many == 0
+        }
     }
 }
 
@@ -133,8 +135,12 @@ impl Worlds {
                 })
                 .collect();
             [
-                Reliability::of(&both.iter().map(|(kind, own, _)| (*kind, *own)).collect::<Vec<_>>()),
-                Reliability::of(&both.iter().map(|(kind, _, other)| (*kind, &other[..])).collect::<Vec<_>>()),
+                Reliability::of(
+                    &both.iter().map(|(kind, deciding, _)| (*kind, *deciding)).collect::<Vec<_>>(),
+                ),
+                Reliability::of(
+                    &both.iter().map(|(kind, _, marginal)| (*kind, &marginal[..])).collect::<Vec<_>>(),
+                ),
             ]
         });
         let cases = || worlds.iter().chain(&left).flatten();
@@ -276,8 +282,12 @@ impl Worlds {
                 continue;
             };
             let errors = match (marginal.shown_error(), decides.shown_error()) {
-                (Some(own), Some(other)) => {
-                    format!("expected calibration error {:.1} and {:.1} points, ", 100.0 * own, 100.0 * other)
+                (Some(marginal_error), Some(deciding_error)) => {
+                    format!(
+                        "expected calibration error {:.1} and {:.1} points, ",
+                        100.0 * marginal_error,
+                        100.0 * deciding_error
+                    )
                 }
                 _ => String::new(),
             };
@@ -363,13 +373,13 @@ fn rows(worlds: &[Vec<Case>; 2]) -> Vec<Row> {
     let much_off = |case: &Case| case.parameter_errors.iter().any(|off| *off > MUCH_OFF);
     let pair = |case: &Case| case.kind == Kind::Pair && case.separable;
     let triple = |case: &Case| case.kind == Kind::Triple && case.separable;
-    let all_named = |case: &Case| case.judgement.hidden.iter().all(|own| own.right);
+    let all_named = |case: &Case| case.judgement.hidden.iter().all(|judged| judged.right);
     let no_third = |case: &Case| case.judgement.too_many == 0;
     let of_form = |foreign: bool| {
         let reported = |case: &Case| -> Vec<bool> {
             let counts = case.kind == Kind::Single && case.foreign_form == foreign;
             let numbers =
-                case.judgement.hidden.first().filter(|_| counts).map_or(&[][..], |own| &own.numbers);
+                case.judgement.hidden.first().filter(|_| counts).map_or(&[][..], |judged| &judged.numbers);
             numbers.iter().filter_map(|number| number.covered).collect()
         };
         worlds.each_ref().map(|world| Rate::of(world.iter().flat_map(reported), |covered| covered))

@@ -37,7 +37,7 @@ pub(crate) fn start(seed: u64, number: usize) -> Option<Start> {
     }
     let mut generator = Generator::new(seed, STREAM + turn as u64, repetition as u32);
     let axis = generator.axis();
-    let seen = |place: &&Place| axis_of(**place).is_none_or(|own| own == axis);
+    let seen = |place: &&Place| axis_of(**place).is_none_or(|of_place| of_place == axis);
     let places: Vec<&Place> = sheet.place.places().iter().filter(seen).collect();
     let place = *places[generator.below(places.len())];
     let mut hidden = generator.hidden(sheet, place);
@@ -53,8 +53,8 @@ fn weaken(hidden: &mut Hidden, share: f64) {
     let key = &plant::effects::sheet(hidden.name).expect("only effects of the catalogue are drawn").keys[0];
     let amplitude = hidden.numbers[0];
     let of_scale = |scale: Scale| Some((scale, scale.excursion(amplitude)?, smallest(key, scale)?));
-    let Some((scale, own, least)) = Scale::of(key).into_iter().find_map(of_scale) else { return };
-    let value = scale.value(least * (own / least).powf(share)).clamp(key.min.max(0.0), key.max);
+    let Some((scale, excursion, least)) = Scale::of(key).into_iter().find_map(of_scale) else { return };
+    let value = scale.value(least * (excursion / least).powf(share)).clamp(key.min.max(0.0), key.max);
     hidden.numbers[0] = if key.signed { amplitude.signum() * value } else { value };
 }
 

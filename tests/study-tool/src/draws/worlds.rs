@@ -70,9 +70,9 @@ pub(crate) fn is_beyond_drawn(hidden: &Hidden) -> bool {
     let keys = plant::effects::sheet(hidden.name).map_or(&[][..], |sheet| sheet.keys);
     let Some((key, number)) = keys.first().zip(hidden.numbers.first()) else { return false };
     Scale::of(key).into_iter().filter_map(|scale| Some((scale, scale.excursion(*number)?))).any(
-        |(scale, own)| {
+        |(scale, excursion)| {
             let ends = key.drawn.map(|end| scale.excursion(end).unwrap_or(0.0));
-            own > ends[0].max(ends[1]) * (1.0 + f64::EPSILON)
+            excursion > ends[0].max(ends[1]) * (1.0 + f64::EPSILON)
         },
     )
 }
@@ -177,12 +177,16 @@ mod tests {
                 assert!(draw.recipe.hidden.iter().all(|hidden| hidden.name != effect.name));
                 let key = &plant::effects::sheet(effect.name).unwrap().keys[0];
                 let scales = Scale::of(key);
-                let excursion = scales
+                let excursions = scales
                     .iter()
                     .find_map(|scale| Some((scale.excursion(effect.numbers[0])?, smallest(key, *scale)?)));
-                let (own, smallest) = excursion.unwrap_or_else(|| panic!("{}", effect.name));
+                let (excursion, smallest) = excursions.unwrap_or_else(|| panic!("{}", effect.name));
                 // A file takes no spool that is faster than its largest number.
-                assert!(own < 0.81 * smallest || effect.numbers[0] == key.max, "{}: {own}", effect.name);
+                assert!(
+                    excursion < 0.81 * smallest || effect.numbers[0] == key.max,
+                    "{}: {excursion}",
+                    effect.name
+                );
             }
             factors.extend(background.valve_point_factors.into_iter().flatten());
         }

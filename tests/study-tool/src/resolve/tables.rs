@@ -77,10 +77,10 @@ pub(crate) struct Class {
 
 impl Table {
     /// Collects the table of the results so far.
-    pub fn of(study: &Study, own_label: &str) -> Result<Self, FolderError> {
+    pub fn of(study: &Study, run_label: &str) -> Result<Self, FolderError> {
         let (mut singles, mut open, mut program, mut cases) = (0, 0, None, Vec::new());
         for draw in study.draws.iter().filter(|draw| draw.kind == Kind::Single) {
-            let folder = study.run(own_label, draw.number);
+            let folder = study.run(run_label, draw.number);
             if !folder.exists() {
                 continue;
             }
@@ -89,7 +89,7 @@ impl Table {
             let Ok(report) = report::read(&folder.join("report.json")) else { continue };
             open += usize::from(leaves_open(&report));
             if let Some(entry) = ambiguous(draw, &report) {
-                cases.push(case(study, own_label, draw, (&report, entry))?);
+                cases.push(case(study, run_label, draw, (&report, entry))?);
             }
         }
         let mut classes: BTreeMap<&str, Vec<&Case>> = BTreeMap::new();
@@ -101,7 +101,7 @@ impl Table {
         classes.sort_by_key(|class| std::cmp::Reverse(class.ambiguous));
         Ok(Table {
             schema_version: SCHEMA_VERSION,
-            label: own_label.to_owned(),
+            label: run_label.to_owned(),
             program,
             seed: study.plan.seed,
             shape: study.plan.shape,
@@ -194,7 +194,7 @@ impl Class {
 
 fn case(
     study: &Study,
-    own_label: &str,
+    run_label: &str,
     draw: &Draw,
     (report, entry): (&Report, &Named),
 ) -> Result<Case, FolderError> {
@@ -211,7 +211,7 @@ fn case(
         problem: None,
         named: Vec::new(),
     };
-    let folder = study.run(&label(own_label), draw.number);
+    let folder = study.run(&label(run_label), draw.number);
     if !folder.exists() || case.experiment.is_none() {
         return Ok(case);
     }

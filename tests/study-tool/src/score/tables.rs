@@ -139,10 +139,10 @@ impl Tables {
             wall_s: QuantileSummary::of(cases.iter().map(|case| case.wall_s)),
             memory_mib: QuantileSummary::of(cases.iter().map(|case| case.memory_kib as f64 / 1024.0)),
             claimed_closed_ratio: QuantileSummary::of(
-                judged_right().filter_map(|own| own.claimed_closed_ratio),
+                judged_right().filter_map(|judgement| judgement.claimed_closed_ratio),
             ),
             claimed_joint_ratio: QuantileSummary::of(
-                judged_right().filter_map(|own| own.claimed_joint_ratio),
+                judged_right().filter_map(|judgement| judgement.claimed_joint_ratio),
             ),
             errors,
         }

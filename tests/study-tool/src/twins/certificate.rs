@@ -90,7 +90,7 @@ fn driven(run: ClosedLoopRun, rig: &RigParameters, axis: Axis) -> TrueTrajectory
     };
     TrueTrajectory {
         rig: rig.clone(),
-        measured: Axis::ALL.map(|own| own == axis),
+        measured: Axis::ALL.map(|each| each == axis),
         start: run.start,
         settling: 1,
         inputs: run.inputs,

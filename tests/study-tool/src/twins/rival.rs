@@ -76,10 +76,10 @@ impl Screening {
         let response = |rig: &RigParameters| observer.between(&observer.readings(rig), &without);
         let of_parameter = |name: &str| {
             let all = response(&with_parameter(&rig, name, 1.0 + CHANGE).ok()?);
-            Some(all.into_iter().map(|own| own / CHANGE).collect())
+            Some(all.into_iter().map(|difference| difference / CHANGE).collect())
         };
         let parameters = PARAMETERS.iter().map(|name| of_parameter(name)).collect::<Option<_>>()?;
-        let axes = Axis::ALL.map(|own| own == axis);
+        let axes = Axis::ALL.map(|each| each == axis);
         let candidates = Candidate::all(&rig, axes, false, &[hidden.name.to_owned()]);
         let of = |candidate: Candidate| {
             let sheet = candidate.sheet;
@@ -100,11 +100,11 @@ impl Screening {
             let mut best: Option<Screened> = None;
             for length in LENGTHS {
                 for from in (1..windows.saturating_sub(length)).step_by(BETWEEN) {
-                    let Some(own) = self.screened(*candidate, &products[at], [from, length]) else {
+                    let Some(screened) = self.screened(*candidate, &products[at], [from, length]) else {
                         continue;
                     };
-                    if best.as_ref().is_none_or(|best| own.contrast > best.contrast) {
-                        best = Some(own);
+                    if best.as_ref().is_none_or(|best| screened.contrast > best.contrast) {
+                        best = Some(screened);
                     }
                 }
                 if best.as_ref().is_some_and(|best| best.contrast > CONTRAST) {
@@ -156,15 +156,15 @@ impl Screening {
         let along = all.view((2, 0), (count, 2)).into_owned();
         // Residuals of signature and response after the parameters.
         let left = all.view((0, 0), (2, 2)) - along.transpose() * factor.solve(&along);
-        let [square, own, product] = [left[(0, 0)], left[(1, 1)], left[(0, 1)]];
-        let amplitude = product / own;
-        if !(own > 0.0 && square > 0.0)
+        let [square, response_square, product] = [left[(0, 0)], left[(1, 1)], left[(0, 1)]];
+        let amplitude = product / response_square;
+        if !(response_square > 0.0 && square > 0.0)
             || amplitude == 0.0
             || amplitude < 0.0 && !candidate.sheet.keys[0].signed
         {
             return None;
         }
-        let share = (1.0 - product * product / own / square).max(1e-9);
+        let share = (1.0 - product * product / response_square / square).max(1e-9);
         let mut start = candidate.origin();
         let middle = candidate.coordinate(0, nominal(candidate.sheet)[0].1);
         let [least, most] = candidate.fit_bounds(0);
@@ -181,8 +181,8 @@ impl Screening {
         let fit = Fit { observer, observed: &observer.baseline, candidate, rig: &self.rig, priors: &priors };
         let start = fit.at([&screened.start[..], &[0.0; PARAMETERS.len()]].concat())?;
         let nearest = fit.nearest(start, screened.distance.powi(2));
-        let (own, deviations) = nearest.coordinates.split_at(candidate.sheet.keys.len());
-        if !is_drawn(&candidate, own[0]) {
+        let (effect, deviations) = nearest.coordinates.split_at(candidate.sheet.keys.len());
+        if !is_drawn(&candidate, effect[0]) {
             return None;
         }
         let rig = fit.rig_at(&nearest.coordinates)?;
@@ -191,7 +191,7 @@ impl Screening {
         let model = Model {
             effect: candidate.sheet.name.to_owned(),
             place: candidate.place.to_string(),
-            numbers: candidate.effect_parameters(own),
+            numbers: candidate.effect_parameters(effect),
             wrong_parameters: off.collect(),
         };
         Some(Rival { rig, model, left })

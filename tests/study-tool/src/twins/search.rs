@@ -167,24 +167,24 @@ fn of_rival(
         return Err(Refusal::NotSeen);
     }
     let noisy = |rig: &RigParameters| with_noise(rig, noise).map_err(|_| Refusal::NoRecord);
-    let (own, other) = (noisy(rig)?, noisy(&rival.rig)?);
-    let train = in_record(record, screened.part, &own, &other);
+    let (noisy_rig, noisy_rival) = (noisy(rig)?, noisy(&rival.rig)?);
+    let train = in_record(record, screened.part, &noisy_rig, &noisy_rival);
     if probability(train) > ALIKE {
         return Err(Refusal::NotAlike);
     }
     let axis = start.recipe.axis;
-    let menu = in_menu([&own, &other], axis);
+    let menu = in_menu([&noisy_rig, &noisy_rival], axis);
     if !menu.values().any(|distance| probability(*distance) >= APART) {
         return Err(Refusal::NoExperiment);
     }
     let hidden = &start.recipe.hidden[0];
-    let own = Model {
+    let model = Model {
         effect: hidden.name.to_owned(),
         place: hidden.place.to_string(),
         numbers: hidden.numbers.clone(),
         wrong_parameters: Vec::new(),
     };
-    let [hidden, rival] = if start.rival_is_true { [rival.model, own] } else { [own, rival.model] };
+    let [hidden, rival] = if start.rival_is_true { [rival.model, model] } else { [model, rival.model] };
     Ok(Twin {
         number: 0,
         start: number,

@@ -43,7 +43,8 @@ pub(crate) fn one(arguments: &OneArguments, stop: &AtomicBool) -> ExitCode {
         Ok(None) => ExitCode::from(INTERRUPTED),
         Err(error) => {
             eprintln!("study: {error}");
-            let unmade = error.downcast_ref().is_some_and(|own| matches!(own, StepError::Make { .. }));
+            let unmade =
+                error.downcast_ref().is_some_and(|step_error| matches!(step_error, StepError::Make { .. }));
             ExitCode::from(if unmade { RECORD_FAILED } else { NOT_TRIED as u8 })
         }
     }
@@ -74,8 +75,8 @@ fn run_step(arguments: &OneArguments, stop: &AtomicBool) -> Result<Option<Value>
             return Ok(Some(json!({"kind": draw.kind})));
         }
         let path = study.class(number);
-        let own = if path.exists() { Some(read_draw(&path, number)?) } else { None };
-        step.without = Some(left_out(draw, classes.get(&number).or(own.as_ref())));
+        let computed = if path.exists() { Some(read_draw(&path, number)?) } else { None };
+        step.without = Some(left_out(draw, classes.get(&number).or(computed.as_ref())));
     }
     if step.run(draw, &program)?.is_none() {
         return Ok(None);
