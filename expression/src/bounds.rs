@@ -13,17 +13,22 @@ use crate::curve::Table;
 use crate::grammar::{Binary, ExpressionError, Kind, NodeId, Nodes, Result};
 
 /// Largest bound that counts as finite.
-pub const MOST: f64 = 1e100;
+pub(crate) const MOST: f64 = 1e100;
 
 /// Smallest and largest value.
-pub type Range = [f64; 2];
+pub(crate) type Range = [f64; 2];
 
 /// Bounds of a node; `of` gives the range of a name, and a table comes before a function. Names and numbers of arguments were
 /// checked.
 ///
 /// # Errors
 /// [`ExpressionError`] at the node that is not proven finite.
-pub fn bounds(nodes: &Nodes, place: NodeId, of: &dyn Fn(&str) -> Range, tables: &[Table]) -> Result<Range> {
+pub(crate) fn bounds(
+    nodes: &Nodes,
+    place: NodeId,
+    of: &dyn Fn(&str) -> Range,
+    tables: &[Table],
+) -> Result<Range> {
     let node = nodes.get(place);
     let bounds = |place: NodeId| bounds(nodes, place, of, tables);
     let range = match &node.kind {

@@ -11,7 +11,7 @@ pub const RESERVED: [&str; 19] = [
 
 /// A function and the least number of its arguments; `min` and `max` take more.
 #[must_use]
-pub fn function(name: &str) -> Option<(Code, usize)> {
+pub(crate) fn function(name: &str) -> Option<(Code, usize)> {
     Some(match name {
         "abs" => (Code::Abs, 1),
         "sign" => (Code::Sign, 1),
@@ -35,6 +35,7 @@ pub trait Compile {
     /// Where an expression stands, if names mean different things at different places.
     type Scope: Copy;
 
+    /// A copy of the node with this index.
     fn at(&self, place: NodeId) -> Node;
 
     /// Where operations are collected.

@@ -12,6 +12,7 @@ pub trait Dimensions {
     /// Where an expression stands, if names mean different things at different places.
     type Scope: Copy;
 
+    /// A copy of the node with this index.
     fn at(&self, place: NodeId) -> Node;
 
     /// The dimension of a name.

@@ -15,7 +15,7 @@ use crate::tape::{Builder, Code, LeafLayout, Register, Tape};
 use crate::units::Dimension;
 
 /// Registers of a formula at most: names, numbers and operations.
-pub const MOST_REGISTERS: usize = 96;
+pub(crate) const MOST_REGISTERS: usize = 96;
 
 /// A variable or a parameter of a formula.
 #[derive(Clone, Copy, Debug)]
@@ -49,7 +49,7 @@ pub struct Formula {
     registers: [f64; MOST_REGISTERS],
     parameters: usize,
     /// Smallest and largest value that it can have over all ranges.
-    pub bounds: Range,
+    pub(crate) bounds: Range,
     /// Names of the tables that it reads.
     tables: Vec<String>,
 }
@@ -128,6 +128,7 @@ impl Formula {
         self.tape.compute(&mut registers)
     }
 
+    /// Whether it calls the table of this name.
     #[must_use]
     pub fn reads_table(&self, name: &str) -> bool {
         self.tables.iter().any(|table| table == name)

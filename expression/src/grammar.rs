@@ -31,9 +31,13 @@ pub type NodeId = u32;
 pub enum Kind {
     /// A number in SI with its unit, if it has one.
     Number(f64, Option<Unit>),
+    /// A symbol, `t` or `pi`, as it is written.
     Name(String),
+    /// The operand times -1.
     Negation(NodeId),
+    /// Left and right operand; `>` and `>=` are kept as `<` and `<=` with their operands exchanged.
     Binary(Binary, NodeId, NodeId),
+    /// A function or a table, with its arguments in order; their number is not checked here.
     Call(String, Vec<NodeId>),
 }
 
@@ -51,25 +55,38 @@ impl Kind {
 /// Operators between two operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Binary {
+    /// `a + b`.
     Add,
+    /// `a - b`.
     Subtract,
+    /// `a * b`.
     Multiply,
+    /// `a / b`.
     Divide,
+    /// `a ^ b`.
     Power,
+    /// `a < b`, a number: 1 or 0, as of all conditions.
     Less,
+    /// `a <= b`.
     LessOrEqual,
+    /// `a == b`.
     Equal,
+    /// `a != b`.
     NotEqual,
+    /// Whether both operands differ from 0.
     And,
+    /// Whether either operand differs from 0.
     Or,
 }
 
 /// A node and the byte of the file at which it stands.
 #[derive(Clone, Debug)]
 pub struct Node {
+    /// What it computes, with the indices of its operands.
     pub kind: Kind,
+    /// Byte of the file, from 0: of an operator its own, else that of the first character.
     pub at: usize,
-    pub depth: usize,
+    pub(crate) depth: usize,
 }
 
 /// All nodes of a file.
@@ -79,26 +96,33 @@ pub struct Nodes(Vec<Node>);
 /// An error in an expression: at which byte of the file, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExpressionError {
+    /// Byte of the file, from 0.
     pub at: usize,
+    /// Message without the place.
     pub why: String,
     /// Two units do not match; which one is expected depends on the whole expression.
-    pub is_unit_mismatch: bool,
+    pub(crate) is_unit_mismatch: bool,
 }
 
 /// Result of reading or compiling an expression.
-pub type Result<T, E = ExpressionError> = core::result::Result<T, E>;
+pub(crate) type Result<T, E = ExpressionError> = core::result::Result<T, E>;
 
 impl ExpressionError {
+    /// An error other than a unit mismatch.
     pub fn new(at: usize, why: impl Into<String>) -> Self {
         Self { at, why: why.into(), is_unit_mismatch: false }
     }
 
-    pub fn unit_mismatch(at: usize, why: impl Into<String>) -> Self {
+    pub(crate) fn unit_mismatch(at: usize, why: impl Into<String>) -> Self {
         Self { is_unit_mismatch: true, ..Self::new(at, why) }
     }
 }
 
 impl Nodes {
+    /// The node of an index.
+    ///
+    /// # Panics
+    /// For an index beyond the last node.
     pub fn get(&self, place: NodeId) -> &Node {
         &self.0[place as usize]
     }
@@ -173,7 +197,7 @@ pub enum Binding {
 }
 
 /// Bindings of names; a name without one stays as it is.
-pub type Bindings<'a> = dyn Fn(&str) -> Option<Binding> + 'a;
+pub(crate) type Bindings<'a> = dyn Fn(&str) -> Option<Binding> + 'a;
 
 struct Parser<'a> {
     text: &'a str,
@@ -353,6 +377,7 @@ impl Parser<'_> {
     }
 }
 
+/// Letters and digits of any script, and `_`.
 pub fn is_name_character(character: char) -> bool {
     character.is_alphanumeric() || character == '_'
 }
@@ -398,82 +423,4 @@ fn number_length(text: &str) -> usize {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A tree as a text with all its brackets.
-    fn shown(nodes: &Nodes, place: NodeId) -> String {
-        match &nodes.get(place).kind {
-            Kind::Number(value, _) => value.to_string(),
-            Kind::Name(name) => name.clone(),
-            Kind::Negation(inner) => format!("(-{})", shown(nodes, *inner)),
-            Kind::Binary(operator, left, right) => {
-                format!("({operator:?} {} {})", shown(nodes, *left), shown(nodes, *right))
-            }
-            Kind::Call(name, arguments) => {
-                let arguments: Vec<_> = arguments.iter().map(|argument| shown(nodes, *argument)).collect();
-                format!("{name}({})", arguments.join(","))
-            }
-        }
-    }
-
-    fn read(text: &str) -> Result<String> {
-        let mut nodes = Nodes::default();
-        nodes.parse(text, 0).map(|place| shown(&nodes, place))
-    }
-
-    #[test]
-    fn operators_bind_as_in_a_book() {
-        for (text, tree) in [
-            ("1 - 2 - 3", "(Subtract (Subtract 1 2) 3)"),
-            ("a+b*c", "(Add a (Multiply b c))"),
-            ("-x^2", "(-(Power x 2))"),
-            ("2^-3^2", "(Power 2 (-(Power 3 2)))"),
-            ("a < b and c >= d or e", "(Or (And (Less a b) (LessOrEqual d c)) e)"),
-            ("order * andy", "(Multiply order andy)"),
-            ("if(x > 0, max(a, b), f())", "if(Less 0 x),max(a,b),f())".replace("if(", "if((").as_str()),
-            ("10[mm] + .5e-3", "(Add 0.01 0.0005)"),
-            ("2e", "?"),
-        ] {
-            let expected = if tree == "?" { None } else { Some(tree.to_owned()) };
-            assert_eq!(read(text).ok(), expected, "{text}");
-        }
-    }
-
-    #[test]
-    fn what_is_wrong_is_reported_at_its_byte() {
-        for (text, at) in [
-            ("", 0),
-            ("a +", 3),
-            ("a ? b", 2),
-            ("(a", 2),
-            ("a)", 1),
-            ("f(a b)", 4),
-            ("3[blub]", 2),
-            ("3[mm", 2),
-            ("1e999", 0),
-            ("a b", 2),
-        ] {
-            assert_eq!(read(text).map_err(|wrong| wrong.at), Err(at), "{text}");
-        }
-    }
-
-    #[test]
-    fn hostile_sizes_are_refused_without_the_stack() {
-        for text in [
-            format!("{}1{}", "(".repeat(100_000), ")".repeat(100_000)),
-            "-".repeat(100_000) + "1",
-            "abs(".repeat(100_000) + "1",
-            vec!["1"; 100_000].join("^"),
-            vec!["1"; 1000].join("<"),
-        ] {
-            let why = read(&text).expect_err("too large").why;
-            assert!(why.contains("deeper than 64"), "{why}");
-        }
-        for text in [format!("max({})", vec!["1"; 20_000].join(",")), vec!["1"; 1_000_000].join("+")] {
-            assert!(read(&text).expect_err("too many").why.contains("more than 10000"));
-        }
-        let brackets = format!("{}1{}", "(".repeat(65), ")".repeat(65));
-        assert_eq!(read(&brackets).expect_err("too deep").at, 64, "at the first bracket that is too many");
-    }
-}
+mod tests;

@@ -21,14 +21,14 @@ pub struct Inputs<'a> {
 impl Inputs<'static> {
     /// No inputs.
     #[must_use]
-    pub const fn none() -> Self {
+    pub(crate) const fn none() -> Self {
         Self { time_s: &[], samples_si: &[] }
     }
 }
 
 impl Inputs<'_> {
     /// Value and rate of an input in straight lines between its samples; level before the first and after the last.
-    pub fn between(&self, input: usize, time_s: f64) -> (f64, f64) {
+    pub(crate) fn between(&self, input: usize, time_s: f64) -> (f64, f64) {
         let Some(samples) = self.samples_si.get(input).filter(|samples| !samples.is_empty()) else {
             return (f64::NAN, 0.0);
         };

@@ -23,7 +23,9 @@
 //!
 //! Grammar and functions: `docs/model-files.md`.
 
-pub mod bounds;
+#![warn(missing_docs)] // an interface of other crates
+
+mod bounds;
 pub mod compile;
 pub mod constants;
 pub mod curve;

@@ -29,9 +29,13 @@ const GREEK: &str = "alpha beta gamma delta epsilon zeta eta theta iota kappa la
 pub enum Operand {
     /// By itself.
     None,
+    /// First summand: conditions and `if` are in brackets, a leading minus is not.
     FirstTerm,
+    /// Summand behind a sign: sums and negations are in brackets too.
     Term,
+    /// First factor: as [`Operand::Term`].
     FirstFactor,
+    /// Factor behind another one: products are in brackets too.
     Factor,
 }
 

@@ -11,29 +11,53 @@ use crate::past::History;
 /// What an operation does with its operands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Code {
+    /// `a + b`.
     Add,
+    /// `a - b`.
     Subtract,
+    /// `a * b`.
     Multiply,
+    /// `a / b`; 0/0 is NaN.
     Divide,
+    /// `a ^ b`; NaN for a negative base with an exponent that is no integer.
     Power,
+    /// `-a`.
     Negate,
+    /// Absolute value.
     Abs,
+    /// -1, 0 or 1; NaN for an infinite operand.
     Sign,
+    /// The smaller operand; NaN where either is.
     Min,
+    /// The larger operand; NaN where either is.
     Max,
+    /// Square root; NaN below 0.
     Sqrt,
+    /// `e^a`.
     Exp,
+    /// Natural logarithm; minus infinity at 0, NaN below.
     Log,
+    /// Hyperbolic tangent.
     Tanh,
+    /// Sine of an angle in radians.
     Sin,
+    /// Cosine of an angle in radians.
     Cos,
+    /// Arc tangent in radians, -pi/2 to pi/2.
     Atan,
+    /// Largest integer up to the operand.
     Floor,
+    /// `a < b`: 1 or 0; 0 where either is NaN.
     Less,
+    /// `a <= b`: 1 or 0; 0 where either is NaN.
     LessOrEqual,
+    /// `a == b`: 1 or 0; 0 where either is NaN.
     Equal,
+    /// `a != b`: 1 or 0; 1 where either is NaN.
     NotEqual,
+    /// 1 where both operands differ from 0, else 0; NaN differs from 0.
     And,
+    /// 1 where either operand differs from 0, else 0; NaN differs from 0.
     Or,
     /// First operand not 0: the second, else the third.
     Select,

@@ -64,7 +64,7 @@ impl History {
 
     /// Steps that fit into the ring.
     #[must_use]
-    pub fn room(&self) -> usize {
+    pub(crate) fn room(&self) -> usize {
         self.times_s.len()
     }
 
@@ -172,7 +172,7 @@ impl History {
 
     /// Value and rate of a leaf at a time.
     #[must_use]
-    pub fn value(&self, leaf: Register, time_s: f64) -> [f64; 2] {
+    pub(crate) fn value(&self, leaf: Register, time_s: f64) -> [f64; 2] {
         let place = self.place(leaf);
         if time_s.is_nan() || self.leaves.is_empty() {
             return [f64::NAN, 0.0];

@@ -31,38 +31,47 @@ struct Operation {
 /// Counts of the registers that are set from outside: the leaves. They follow register 0, the time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LeafLayout {
+    /// Inputs: registers from 1.
     pub inputs: usize,
+    /// States, behind the inputs.
     pub states: usize,
+    /// Parameters, behind the states; they are constant over a record.
     pub parameters: usize,
+    /// Memories, behind the parameters; a model adds the directions of its frictions.
     pub memories: usize,
 }
 
 impl LeafLayout {
+    /// Register of an input, by its index among the inputs; no function here checks its index.
     pub fn input(self, index: usize) -> Register {
         (1 + index) as Register
     }
 
+    /// Register of a state, by its index among the states.
     pub fn state(self, index: usize) -> Register {
         (1 + self.inputs + index) as Register
     }
 
+    /// Register of a parameter, by its index among the parameters.
     pub fn parameter(self, index: usize) -> Register {
         (1 + self.inputs + self.states + index) as Register
     }
 
+    /// Register of a memory, by its index among the memories.
     pub fn memory(self, index: usize) -> Register {
         (1 + self.inputs + self.states + self.parameters + index) as Register
     }
 
     /// How many there are, the time included.
     #[must_use]
-    pub fn count(self) -> usize {
+    pub(crate) fn count(self) -> usize {
         1 + self.inputs + self.states + self.parameters + self.memories
     }
 }
 
 /// Collects operations, each once.
 pub struct Builder {
+    /// Counts of the leaves, fixed before the first operation.
     pub leaves: LeafLayout,
     constants: Vec<f64>,
     operations: Vec<Operation>,
@@ -73,10 +82,12 @@ pub struct Builder {
 const CONSTANTS: usize = 2 * crate::grammar::MOST_NODES;
 
 impl Builder {
+    /// A builder without constants and operations.
     pub fn new(leaves: LeafLayout) -> Self {
         Self { leaves, constants: Vec::new(), operations: Vec::new(), known: HashMap::new() }
     }
 
+    /// Register of a constant; constants with the same bits share one.
     pub fn constant(&mut self, value: f64) -> Register {
         let known = self.constants.iter().position(|other| other.to_bits() == value.to_bits());
         let index = known.unwrap_or_else(|| {
@@ -86,6 +97,7 @@ impl Builder {
         (self.leaves.count() + index) as Register
     }
 
+    /// Register of an operation, at most three operands; equal operations share one.
     pub fn push(&mut self, code: Code, operands: &[Register]) -> Register {
         let mut all = [0; 3];
         all[..operands.len()].copy_from_slice(operands);
@@ -97,6 +109,7 @@ impl Builder {
         })
     }
 
+    /// The operations as a tape, with the registers of its results in order and the curves of [`Code::Table`].
     pub fn tape(self, results: &[Register], curves: Vec<Curve>) -> Tape {
         let (leaves, constants) = (self.leaves.count(), self.constants.len());
         let is_fixed = self.fixed();
@@ -187,6 +200,7 @@ impl Builder {
 /// Operations in their order, and where their results stand.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tape {
+    /// Counts of the leaves, as the builder had them.
     pub leaves: LeafLayout,
     constants: Vec<f64>,
     operations: Vec<Operation>,
@@ -238,22 +252,26 @@ impl Registers {
         Self { values, slopes: vec![[0.0; LANES]; count * width], directions, width, active_operands }
     }
 
+    /// Sets the value of a leaf; its derivatives stay.
     #[inline]
     pub fn set(&mut self, register: Register, value: f64) {
         self.values[register as usize] = value;
     }
 
+    /// Derivatives of a register, one for each direction.
     #[inline]
     pub fn slope_mut(&mut self, register: Register) -> &mut [f64] {
         let start = register as usize * self.width;
         &mut self.slopes[start..start + self.width].as_flattened_mut()[..self.directions]
     }
 
+    /// Value of a register, in SI.
     #[inline]
     pub fn value(&self, register: Register) -> f64 {
         self.values[register as usize]
     }
 
+    /// Derivatives of a register, one for each direction.
     #[inline]
     pub fn slope(&self, register: Register) -> &[f64] {
         let start = register as usize * self.width;
@@ -262,11 +280,13 @@ impl Registers {
 }
 
 impl Tape {
+    /// Number of operations.
     #[must_use]
     pub fn operations(&self) -> usize {
         self.operations.len()
     }
 
+    /// Register of a result, by its index among the results given to [`Builder::tape`].
     #[inline]
     pub fn result(&self, index: usize) -> Register {
         self.results[index]
@@ -331,7 +351,7 @@ impl Tape {
     }
 
     #[must_use]
-    pub fn registers(&self) -> usize {
+    pub(crate) fn registers(&self) -> usize {
         self.leaves.count() + self.constants.len() + self.operations.len()
     }
 
@@ -339,7 +359,7 @@ impl Tape {
     ///
     /// # Panics
     /// Where `registers` are fewer than [`Tape::registers`].
-    pub fn begin(&self, registers: &mut [f64]) {
+    pub(crate) fn begin(&self, registers: &mut [f64]) {
         let leaves = self.leaves.count();
         registers[leaves..leaves + self.constants.len()].copy_from_slice(&self.constants);
     }
@@ -349,7 +369,7 @@ impl Tape {
     /// # Panics
     /// Where `registers` are fewer than [`Tape::registers`].
     #[must_use]
-    pub fn compute(&self, registers: &mut [f64]) -> f64 {
+    pub(crate) fn compute(&self, registers: &mut [f64]) -> f64 {
         let first = self.leaves.count() + self.constants.len();
         let context = EvaluationContext {
             time_s: registers[0],
@@ -401,90 +421,4 @@ fn scale(target: &mut [[f64; LANES]], source: &[[f64; LANES]], factor: f64) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    /// One operation of two parameters, its value and its derivatives.
-    fn computed(code: Code, a: f64, b: f64) -> (f64, [f64; 2]) {
-        let leaves = LeafLayout { parameters: 3, ..LeafLayout::default() };
-        let mut builder = Builder::new(leaves);
-        let operands = [0, 1, 2].map(|index| leaves.parameter(index));
-        let result = builder.push(code, &operands);
-        let curve = Curve::new(vec![0.0, 1.0, 3.0], vec![1.0, 2.0, -2.0]);
-        let tape = builder.tape(&[result], vec![curve]);
-        let mut registers = Registers::new(&tape, 2, |leaf| leaf != leaves.parameter(2));
-        for (index, value) in [a, b, 0.5].into_iter().enumerate() {
-            registers.set(leaves.parameter(index), value);
-        }
-        registers.slope_mut(leaves.parameter(0))[0] = 1.0;
-        registers.slope_mut(leaves.parameter(1))[1] = 1.0;
-        tape.prepare(&mut registers);
-        tape.evaluate(&mut registers, &Inputs::none(), &NONE);
-        let slope = registers.slope(tape.result(0));
-        (registers.value(tape.result(0)), [slope[0], slope[1]])
-    }
-
-    const SMOOTH: [Code; 15] = [
-        Code::Add,
-        Code::Subtract,
-        Code::Multiply,
-        Code::Divide,
-        Code::Power,
-        Code::Negate,
-        Code::Abs,
-        Code::Sqrt,
-        Code::Exp,
-        Code::Log,
-        Code::Tanh,
-        Code::Sin,
-        Code::Cos,
-        Code::Atan,
-        Code::Table(0),
-    ];
-
-    proptest! {
-        /// Central differences with steps of 1e-6: their error is some 1e-9 of the values, which are below 1e3.
-        #[test]
-        fn derivatives_are_those_of_differences(a in 0.1..2.9f64, b in 0.2..3.0f64, which in 0..SMOOTH.len()) {
-            let code = SMOOTH[which];
-            prop_assume!((a - 1.0).abs() > 1e-3);
-            let step = 1e-6;
-            let slopes = computed(code, a, b).1;
-            let by_a = (computed(code, a + step, b).0 - computed(code, a - step, b).0) / (2.0 * step);
-            let by_b = (computed(code, a, b + step).0 - computed(code, a, b - step).0) / (2.0 * step);
-            prop_assert!((slopes[0] - by_a).abs() < 1e-5 * (1.0 + by_a.abs()), "{code:?} by a");
-            prop_assert!((slopes[1] - by_b).abs() < 1e-5 * (1.0 + by_b.abs()), "{code:?} by b");
-        }
-    }
-
-    #[test]
-    fn what_is_not_taken_leaves_no_infinite_derivative() {
-        assert_eq!(computed(Code::Max, -1.0, 0.0), (0.0, [0.0, 1.0]));
-        assert_eq!(computed(Code::Sqrt, 0.0, 0.0), (0.0, [0.0, 0.0]));
-        assert_eq!(computed(Code::Power, 0.0, 0.5).1[0], 0.0);
-        assert_eq!(computed(Code::Select, 0.0, f64::INFINITY), (0.5, [0.0, 0.0]));
-    }
-
-    #[test]
-    fn a_value_that_is_no_number_stays_visible() {
-        for code in [Code::Min, Code::Max, Code::Abs, Code::Sign, Code::Table(0), Code::Select, Code::Power] {
-            assert!(computed(code, f64::NAN, 1.0).0.is_nan(), "{code:?}");
-        }
-        assert!(computed(Code::Divide, 0.0, 0.0).0.is_nan());
-        assert!(computed(Code::Sqrt, -1.0, 0.0).0.is_nan());
-    }
-
-    #[test]
-    fn equal_operations_share_a_register() {
-        let leaves = LeafLayout { parameters: 2, ..LeafLayout::default() };
-        let mut builder = Builder::new(leaves);
-        let operands = [leaves.parameter(0), leaves.parameter(1)];
-        let first = builder.push(Code::Multiply, &operands);
-        let half = builder.constant(0.5);
-        assert_eq!(builder.constant(0.5), half);
-        assert_eq!(builder.push(Code::Multiply, &operands), first);
-        let sum = builder.push(Code::Add, &[first, half]);
-        assert_eq!(builder.tape(&[sum], vec![]).operations(), 2);
-    }
-}
+mod tests;

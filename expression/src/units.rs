@@ -29,6 +29,7 @@ pub struct Dimension([i16; 7]);
 pub struct Unit {
     /// As it is written.
     pub text: String,
+    /// Exponents of its base units.
     pub dimension: Dimension,
     /// SI units in one of it.
     pub factor: f64,
@@ -39,19 +40,23 @@ pub struct Unit {
 pub struct UnitError {
     /// Byte of the text.
     pub at: usize,
+    /// Message without the place.
     pub why: String,
 }
 
 impl Dimension {
     /// Of a pure number.
     pub const NONE: Self = Self([0; 7]);
+    /// Of a second.
     pub const TIME: Self = Self([0, 0, 12, 0, 0, 0, 0]);
 
+    /// Of a product: exponents are added, and limited to 64 in magnitude.
     #[must_use]
     pub fn times(self, other: Self) -> Self {
         self.combined(other, 1)
     }
 
+    /// Of a quotient: exponents are subtracted, and limited to 64 in magnitude.
     #[must_use]
     pub fn over(self, other: Self) -> Self {
         self.combined(other, -1)
