@@ -30,14 +30,16 @@ const NEGLIGIBLE: f64 = 1e-3;
 /// What the reported model leaves of an output on all training records.
 #[derive(Clone, Debug, Serialize)]
 pub struct Residual {
-    pub output: String,
-    pub unit: String,
+    pub(crate) output: String,
+    pub(crate) unit: String,
+    /// Root mean square of measured less modelled; this, noise, model error and signal are in the output's unit.
     pub rms: f64,
     /// Standard deviation of the noise: of the file, or by differences of neighbours.
     pub noise: f64,
+    /// Whether `noise` is that of the file, not an estimate.
     pub is_noise_declared: bool,
     /// Standard deviation of an error that the file declares as that of the model.
-    pub model_error_rms: f64,
+    pub(crate) model_error_rms: f64,
     /// Standard deviation of what was measured.
     pub signal_rms: f64,
     /// Whether it is no more than noise and declared error.

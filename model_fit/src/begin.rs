@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 
 /// Why no model file can begin from a record.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum NewError {
     #[error("{}: {why}", file.display())]
     Open { file: PathBuf, why: std::io::Error },

@@ -39,6 +39,7 @@ pub fn is_rest(values: &[Option<f64>], run: &Run, step: Option<f64>) -> bool {
     (before.is_some() || after.is_some()) && near(before.copied()) && near(after.copied())
 }
 
+/// Equal values in a row, missing samples aside.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Run {
     /// Places from its first sample to its last.

@@ -18,6 +18,7 @@
 
 pub use runlog::discrepancy_report::{Convergence, Outcome};
 
+/// Limits, tolerances and step lengths of one kind of fit.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
     /// Most accepted steps.
@@ -77,7 +78,10 @@ pub enum Step<P> {
     /// The first fraction whose loss is below that of the iterate before.
     Accepted(P),
     /// No fraction lowers the loss, though the linearised model predicts this reduction.
-    Refused { predicted_reduction: f64 },
+    Refused {
+        /// Fall of the loss by the linearised model: up to the tolerance the fit has converged, beyond it has stalled.
+        predicted_reduction: f64,
+    },
     /// No linearisation: a neighbouring rig does not exist.
     Impossible,
 }
@@ -90,6 +94,7 @@ pub struct Estimator {
 }
 
 impl Estimator {
+    /// A loop that has evaluated nothing yet.
     pub fn new(options: Options) -> Self {
         Estimator { options, evaluations: 0 }
     }

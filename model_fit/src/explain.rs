@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 
 /// A model file in words.
 pub struct Explanation {
+    /// Plain text for a terminal, with line ends.
     pub text: String,
     /// As a page, its equations set.
     pub page: String,

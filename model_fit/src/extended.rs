@@ -15,6 +15,7 @@ const TAKEN_BACK: &str = "# Taken back: a held-out record gets worse with this t
 
 /// Why a model file cannot be extended.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum ExtendError {
     #[error(transparent)]
     Text(#[from] toml_edit::TomlError),

@@ -32,6 +32,7 @@ pub(crate) struct Traces {
 
 /// Why held-out records are not judged.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum JudgeError {
     #[error(
         "held_out.start_samples of the model is 0, and a held-out record has numbers of its own (fitted starts, per_record): \

@@ -44,6 +44,8 @@
 //! Held-out records are read and checked before a fit starts, and no value of theirs enters one: they wait until the terms are
 //! chosen and fitted. Keys: `docs/model-files.md`; figures: `docs/model-records.md`.
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod equal_runs;
 pub mod estimator;
 pub mod parallel;
@@ -102,6 +104,7 @@ use std::path::{Path, PathBuf};
 
 /// Why a model file cannot be closed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum ModelError {
     #[error("{}: {why}", file.display())]
     Open { file: PathBuf, why: std::io::Error },
@@ -147,8 +150,10 @@ pub fn read(file: &Path) -> Result<Model, ModelError> {
     Ok(Model::parse(&text, file)?)
 }
 
+/// A closed model: its report, and the texts of the other files.
 #[derive(Clone, Debug)]
 pub struct ClosedModel {
+    /// Content of `report.json`.
     pub report: ModelReport,
     /// Why the held-out records were not judged.
     pub not_judged: Option<String>,
@@ -259,9 +264,13 @@ fn is_searched(found: &select::SearchResult<'_>, search: Search) -> Result<bool,
 /// Size and notes of a record, before anything is fitted.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct RecordPreview {
+    /// Name of its file, without folders.
     pub record: String,
+    /// Samples on which the model is compared.
     pub rows: usize,
+    /// From the first sample to the last one, s.
     pub length_s: f64,
+    /// Remarks on the record in sentences, as in a report.
     pub notes: Vec<String>,
 }
 

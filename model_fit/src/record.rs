@@ -15,6 +15,7 @@ const MOST_MISSING: f64 = 0.2;
 
 /// Why a record cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum RecordError {
     #[error(transparent)]
     Read(#[from] ReadError),

@@ -1,10 +1,11 @@
 //! The report of a model file, in the model's own names and units.
 
+mod judgement;
+
 use super::adequacy::Residual;
 use super::discover::{DiscoveredTerm, Located};
-use super::fit::Fitting;
 use super::held_out::{Alternative, HeldOutResidual, Traces};
-use super::judge::{Evaluation, by_effect, is_one_effect};
+use super::judge::{by_effect, is_one_effect};
 use super::record::MeasuredRecord;
 use super::select::{AcceptedSuspect, Fitted, SearchResult};
 use super::structure::Structure;
@@ -12,6 +13,7 @@ use super::{bounds, covariance, look};
 use crate::Verdict;
 use crate::estimator::Outcome;
 use crate::held_out::WORSE;
+use judgement::judgement;
 use model::{Change, Model};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -24,11 +26,15 @@ pub(super) const SCHEMA_VERSION: u32 = 1;
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ModelReport {
+    /// 1; a report with another version extends no model file.
     pub schema_version: u32,
     /// Path of the model file as it was given.
     pub model: String,
+    /// Name of the model, as its file says.
     pub name: String,
+    /// Names of the files of the training records, without folders.
     pub train: Vec<String>,
+    /// By the training records alone; a held-out record sets `confirmed` and `taken_back`.
     pub verdict: Verdict,
     /// What was found, or was not, in a sentence.
     pub headline: String,
@@ -52,6 +58,7 @@ pub struct ModelReport {
     /// The same with each alternative in place of what was named.
     #[serde(skip_deserializing)]
     pub held_out_alternatives: Vec<AlternativeResidual>,
+    /// Missing suspects in the order in which they were taken; empty where none passed its gates.
     pub named: Vec<NamedSuspect>,
     /// Where nothing was named and a search found some: terms that no suspect describes.
     pub discovered: Vec<DiscoveredTerm>,
@@ -61,8 +68,10 @@ pub struct ModelReport {
     /// Every suspect beside the model alone, the most likely first.
     #[serde(skip_deserializing)]
     pub suspects: Vec<SuspectJudgement>,
+    /// Identifiability of numbers and suspects on the training records.
     #[serde(skip_deserializing)]
     pub structure: Structure,
+    /// Remarks on records, fits and numbers, in sentences.
     pub notes: Vec<String>,
     /// How many of them, the first, say that the model explains nothing of an output.
     #[serde(skip)]
@@ -76,17 +85,21 @@ pub struct ModelReport {
 /// A parameter: estimate, error, and the estimate without the named suspects.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct ParameterEstimate {
+    /// In the model file; of a number of one record with the record's name, a fitted start as `start of x in a.csv`.
     pub name: String,
     /// The term or suspect that it belongs to; `None` for a number of the model.
-    pub suspect: Option<String>,
+    pub(crate) suspect: Option<String>,
+    /// Unit of value, error and baseline; empty in a report that lacks it.
     #[serde(default)]
     pub unit: String,
+    /// Estimate of the extended model.
     pub value: f64,
     /// By coloured residuals or by blocks of time, the larger, and by a law that is only near; `None` where the records do not
     /// determine it, or it is at the end of its range.
     pub standard_error: Option<f64>,
     /// Fitted without what was named.
-    pub baseline: Option<f64>,
+    pub(crate) baseline: Option<f64>,
+    /// Whether the estimate is at the end of its range, within rounding.
     pub is_at_bound: bool,
     /// Its range has values of one sign alone.
     #[serde(skip)]
@@ -99,21 +112,30 @@ pub struct ParameterEstimate {
 /// Residuals of an output under both models.
 #[derive(Clone, Debug, Serialize)]
 pub struct ResidualComparison {
+    /// Name of the record's file, without folders; `training` for all training records together.
     pub record: String,
+    /// Its name in the model file.
     pub output: String,
+    /// Unit of both root mean squares.
     pub unit: String,
+    /// Root mean square of measured less the model alone.
     pub rms_before: f64,
+    /// Root mean square of measured less the extended model.
     pub rms_after: f64,
     /// After over before.
     pub ratio: Option<f64>,
+    /// Number of samples in both.
     pub rows: usize,
 }
 
 /// Residuals of a held-out record with an alternative in place of the named suspect.
 #[derive(Clone, Debug, Serialize)]
 pub struct AlternativeResidual {
+    /// Name of the alternative.
     pub suspect: String,
+    /// Name of the suspect whose place it takes.
     pub instead_of: String,
+    /// As of the reported model, with the alternative in `rms_after`.
     #[serde(flatten)]
     pub residual: ResidualComparison,
 }
@@ -121,16 +143,18 @@ pub struct AlternativeResidual {
 /// A suspect that is missing in the model.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct NamedSuspect {
+    /// Its name in the model file.
     pub suspect: String,
     /// What it is one form of.
     pub effect: Option<String>,
+    /// The input, equation, definition or output that it changes, such as `equation of v`.
     #[serde(default)]
     pub place: String,
     /// How it stands there.
     #[serde(default)]
     pub term: String,
     #[serde(default)]
-    pub share_explained: f64,
+    pub(crate) share_explained: f64,
     /// Others that explain the records as well, also where they fail another gate than the likelihood.
     #[serde(default)]
     pub alternatives: Vec<String>,
@@ -139,20 +163,24 @@ pub struct NamedSuspect {
 /// Likelihood gain, gates and probability of a suspect.
 #[derive(Clone, Debug, Serialize)]
 pub struct SuspectJudgement {
+    /// Its name in the model file.
     pub suspect: String,
-    pub place: String,
+    pub(crate) place: String,
+    /// Whether the file has it as a decoy: one that does better than every suspect ends the search.
     pub is_decoy: bool,
+    /// Posterior among all suspects and none of them, beside the model alone, 0 to 1.
     pub probability: f64,
     /// Twice the gain in log likelihood, and what chance is granted of it.
-    pub gain: f64,
-    pub penalty: f64,
+    pub(crate) gain: f64,
+    pub(crate) penalty: f64,
     /// Share of what the model leaves, on folds in time.
-    pub share: f64,
+    pub(crate) share: f64,
     /// Mean gain of a fold over its standard error.
     #[serde(rename = "clustered_t")]
-    pub fold_t: f64,
+    pub(crate) fold_t: f64,
+    /// What became of it, and by which gate, in words.
     pub decision: String,
-    pub numbers: Vec<ParameterEstimate>,
+    pub(crate) numbers: Vec<ParameterEstimate>,
 }
 
 pub(crate) fn report(file: &Path, found: &SearchResult<'_>, structure: &Structure) -> ModelReport {
@@ -436,62 +464,4 @@ pub(super) fn numbers(fitted: &Fitted<'_>, baseline: &Fitted<'_>, has_law: bool)
         }
     })
     .collect()
-}
-
-fn judgement(fitting: &Fitting<'_>, evaluation: &Evaluation, found: &SearchResult<'_>) -> SuspectJudgement {
-    let model = fitting.model;
-    let suspect = &model.suspects[evaluation.suspect];
-    let accepted =
-        found.accepted.iter().position(|accepted| accepted.evaluation.suspect == evaluation.suspect);
-    let last = found.last.iter().find(|last| last.suspect == evaluation.suspect);
-    let mut decision = match (accepted, last) {
-        (Some(round), _) => format!("taken, number {}", round + 1),
-        _ if found.accepted.iter().any(|accepted| accepted.alternatives.contains(&evaluation.suspect)) => {
-            "explains the records as well as what was taken".to_owned()
-        }
-        _ if found.accepted.first().is_some_and(|accepted| accepted.near.contains(&evaluation.suspect)) => {
-            format!("cannot be told from what was taken, though it fails: {}", evaluation.gate)
-        }
-        (None, Some(last)) if last.passes => "passes, but another was better".to_owned(),
-        (None, Some(last)) => format!("rejected: {}", last.gate),
-        (None, None) => "rejected beside what was taken".to_owned(),
-    };
-    let numbers = evaluation.values_si.iter().map(|(index, value)| {
-        let parameter = &model.parameters[*index];
-        ParameterEstimate {
-            name: parameter.name.clone(),
-            suspect: Some(suspect.name.clone()),
-            unit: parameter.unit.text.clone(),
-            value: value / parameter.unit.factor,
-            standard_error: None,
-            baseline: None,
-            is_at_bound: bounds::is_at_bound(*value, parameter.range_si),
-            is_of_one_sign: false,
-            expected: None,
-        }
-    });
-    let numbers: Vec<ParameterEstimate> = numbers.collect();
-    let at_end = numbers.iter().find(|number| number.is_at_bound);
-    match (evaluation.convergence.outcome, at_end) {
-        (Outcome::Bound, Some(number)) => {
-            let (name, value, unit) = (&number.name, significant(number.value), &number.unit);
-            decision += &format!("; its {name} ended at the end of the range, {value} {unit}");
-        }
-        (Outcome::Bound, None) => {
-            decision += "; a number of the model ended at the end of its range beside it";
-        }
-        _ => decision += &evaluation.convergence.doubt().map_or(String::new(), |doubt| format!("; {doubt}")),
-    }
-    SuspectJudgement {
-        suspect: suspect.name.clone(),
-        place: place(model, evaluation.suspect),
-        is_decoy: suspect.is_decoy,
-        probability: evaluation.probability,
-        gain: evaluation.gain,
-        penalty: evaluation.penalty,
-        share: evaluation.share,
-        fold_t: evaluation.t,
-        decision,
-        numbers,
-    }
 }

@@ -15,6 +15,7 @@ use std::path::Path;
 pub struct SimulatedRecord {
     /// A row for each compared sample, separated by commas.
     pub table: String,
+    /// One for each output, in the order of the model file.
     pub outputs: Vec<SimulatedOutput>,
     /// What the record looks like, and of what a fit would find another value.
     pub notes: Vec<String>,
@@ -23,7 +24,9 @@ pub struct SimulatedRecord {
 /// An output of a simulation, in its unit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SimulatedOutput {
+    /// Its name in the model file.
     pub output: String,
+    /// Unit of both root mean squares, as the model file has it.
     pub unit: String,
     /// Root mean square of measured less modelled.
     pub rms: f64,

@@ -18,6 +18,7 @@ pub fn median(values: &mut [f64]) -> Option<f64> {
     order_statistic(values, values.len() / 2)
 }
 
+/// Arithmetic mean; NaN for an empty list.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len() as f64
 }

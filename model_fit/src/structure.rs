@@ -51,28 +51,30 @@ pub struct Structure {
 /// Two suspects with nearly equal responses.
 #[derive(Clone, Debug, Serialize)]
 pub struct Twins {
+    /// Names of both.
     pub suspects: [String; 2],
-    pub cosine: f64,
+    pub(crate) cosine: f64,
 }
 
 /// What would show a suspect, or tell two apart.
 #[derive(Clone, Debug, Serialize)]
 pub struct Advice {
+    /// Name of one that is hidden, or of two twins.
     pub suspects: Vec<String>,
     /// States, of which a sensor of one would do; empty where none does.
     pub measure: Vec<String>,
     /// States of which a sensor shows or tells them apart a little.
-    pub hardly: Vec<WeakSensor>,
+    pub(crate) hardly: Vec<WeakSensor>,
 }
 
 /// A sensor that is better than none, and a close call.
 #[derive(Clone, Debug, Serialize)]
-pub struct WeakSensor {
-    pub state: String,
+pub(crate) struct WeakSensor {
+    pub(crate) state: String,
     /// Of what the suspect does there, or that of two which shows less, the part that the model's own numbers cannot do.
-    pub share: f64,
+    pub(crate) share: f64,
     /// Of two suspects with that sensor.
-    pub cosine: Option<f64>,
+    pub(crate) cosine: Option<f64>,
 }
 
 impl Advice {

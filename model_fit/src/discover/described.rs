@@ -10,24 +10,25 @@ use serde::{Deserialize, Serialize};
 pub struct DiscoveredTerm {
     /// What `parameters` call the suspect of its numbers.
     pub name: String,
+    /// The input, equation, definition or output that it changes, such as `equation of v`.
     #[serde(default)]
     pub place: String,
     /// How it stands there; its coefficient `k_found` is among `parameters`.
     #[serde(default)]
-    pub term: String,
+    pub(crate) term: String,
     /// Inputs and states that it reads.
     #[serde(default)]
     pub variables: Vec<String>,
     #[serde(default)]
-    pub share_explained: f64,
+    pub(crate) share_explained: f64,
     /// Share of halves of the records in which the best term is one like it.
     #[serde(default)]
     pub stability: f64,
     /// Other terms of the search that explain the records as well.
     #[serde(default)]
-    pub alternatives: Vec<String>,
+    pub(crate) alternatives: Vec<String>,
     /// As `[[suspects]]` of a model file, before it was fitted.
-    pub text: String,
+    pub(crate) text: String,
 }
 
 impl ModelReport {

@@ -52,10 +52,11 @@ pub struct Located {
     pub alternatives: Vec<Place>,
 }
 
+/// A place and variables of which a function explains as much as the reported one.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Place {
-    pub place: String,
-    pub variables: Vec<String>,
+    pub(crate) place: String,
+    pub(crate) variables: Vec<String>,
 }
 
 /// A group of terms: a place with variables.
