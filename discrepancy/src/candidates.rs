@@ -27,12 +27,15 @@ const FARTHEST: f64 = 3.0;
 /// Keys of a sheet at most.
 const MOST_KEYS: usize = 6;
 
+/// An effect or a suspect at a place, as a term that a fit may add.
 #[derive(Clone, Copy, Debug)]
 pub struct Candidate {
+    /// Its data sheet: name, keys with units and ranges.
     pub sheet: &'static Sheet,
+    /// Where it acts.
     pub place: Place,
     /// The suspect that it is of; `None` for an effect of the catalogue.
-    pub suspect: Option<&'static Suspect>,
+    pub(crate) suspect: Option<&'static Suspect>,
     /// Numbers of its keys in the rig file, in the file's units; `None` where it is not on there.
     present: Option<[f64; MOST_KEYS]>,
 }
@@ -176,7 +179,7 @@ impl Candidate {
     }
 
     /// Smallest and largest coordinate of a key.
-    pub fn range(&self, key: usize) -> [f64; 2] {
+    pub(crate) fn range(&self, key: usize) -> [f64; 2] {
         let sheet_key = &self.sheet.keys[key];
         let scale = self.scale(key);
         let ends = [scale.coordinate(sheet_key.min), scale.coordinate(sheet_key.max)];
@@ -214,7 +217,7 @@ impl Candidate {
 
     /// Standard error of a key's number: half of the farther end of two standard errors of its coordinate, within the key's
     /// range. Where a number is not linear in its coordinate, the slope alone is too narrow towards the neutral value.
-    pub fn standard_error(&self, key: usize, coordinate: f64, error: f64) -> f64 {
+    pub(crate) fn standard_error(&self, key: usize, coordinate: f64, error: f64) -> f64 {
         let (scale, sheet_key) = (self.scale(key), &self.sheet.keys[key]);
         let number = scale.number(coordinate);
         let ends = [-2.0, 2.0].map(|errors| scale.number(coordinate + errors * error));
@@ -222,6 +225,7 @@ impl Candidate {
         (error * scale.slope(coordinate).abs()).max(away(ends[0])).max(away(ends[1]))
     }
 
+    /// Coordinate of a key at a number in the file's units, not limited to its range.
     pub fn coordinate(&self, key: usize, number: f64) -> f64 {
         self.scale(key).coordinate(number)
     }

@@ -35,24 +35,26 @@ pub(crate) const PARKED: &str = "parked";
 /// A record's check with what follows for each of its samples.
 #[derive(Clone, Debug)]
 pub struct Checked {
+    /// Findings, and noise, quantum and share of unusable samples of each channel.
     pub report: RecordCheck,
     /// For each channel (by [`Channel::index`]) and row whether the sample can be used; empty for a channel without bad ones.
-    pub unusable: Vec<Vec<bool>>,
+    pub(crate) unusable: Vec<Vec<bool>>,
 }
 
 impl Checked {
+    /// Whether no finding leaves the sample out; true also where the record has none.
     pub fn is_usable(&self, channel: Channel, row: usize) -> bool {
         !self.unusable[channel.index()].get(row).copied().unwrap_or(false)
     }
 
     /// Fatal findings, one line each.
-    pub fn why_not(&self) -> String {
+    pub(crate) fn why_not(&self) -> String {
         let fatal = self.report.findings.iter().filter(|finding| finding.fatal);
         fatal.map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("\n")
     }
 
     /// A record that can be read and still cannot be simulated.
-    pub fn refuse(&mut self, column: Option<&str>, text: String) {
+    pub(crate) fn refuse(&mut self, column: Option<&str>, text: String) {
         self.report.usable = false;
         let (kind, column) = ("not-simulated".into(), column.map(str::to_owned));
         self.report.findings.push(Finding { kind, column, fatal: true, text, ..Finding::default() });
@@ -73,6 +75,7 @@ impl Checked {
     }
 }
 
+/// Checks a record against the sensors and limits of a rig file; never fails, [`RecordCheck::usable`] tells.
 pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     let mut notes = Notes::new(record);
     for warning in &record.warnings {

@@ -11,12 +11,12 @@ use std::path::PathBuf;
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
-    pub command: Command,
+    pub(crate) command: Command,
 }
 
 /// The workflow and its steps.
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Run the whole workflow: report.json, report.html, the extended rig or model file, and next-NAME.toml where an experiment
     /// is proposed for a rig file.
     #[command(
@@ -52,27 +52,27 @@ pub enum Command {
 
 /// Records and the model.
 #[derive(Args, Clone, Debug)]
-pub struct RecordArguments {
+pub(crate) struct RecordArguments {
     /// Rig file: the model. For close, name and check also a model file, of any plant.
     #[arg(long, visible_alias = "model")]
-    pub rig: PathBuf,
+    pub(crate) rig: PathBuf,
     /// Training records: measurement.csv, bus.log, or any CSV with --mapping.
     #[arg(long, required = true, num_args = 1..)]
-    pub train: Vec<PathBuf>,
+    pub(crate) train: Vec<PathBuf>,
     /// Folder for the results, made if missing. Where none is given, close and name write into this folder: discrepancy-results;
     /// the other steps write no files.
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
     #[command(flatten)]
     pub(crate) read: ReadArguments,
     /// Threads; the results do not depend on them. Default: all cores.
     #[arg(long)]
-    pub threads: Option<usize>,
+    pub(crate) threads: Option<usize>,
 }
 
 /// How records are read.
 #[derive(Args, Clone, Debug)]
-pub struct ReadArguments {
+pub(crate) struct ReadArguments {
     /// Mapping file of foreign CSV records, for a rig file; [record] of a model file says how its records are read.
     #[arg(long)]
     pub(crate) mapping: Option<PathBuf>,
@@ -93,134 +93,134 @@ impl ReadArguments {
 
 /// What naming is given.
 #[derive(Args, Clone, Debug)]
-pub struct NameArguments {
+pub(crate) struct NameArguments {
     /// Model and training records.
     #[command(flatten)]
-    pub records: RecordArguments,
+    pub(crate) records: RecordArguments,
     /// An effect that is no candidate; may be given several times.
     #[arg(long, value_name = "EFFECT")]
-    pub without: Vec<String>,
+    pub(crate) without: Vec<String>,
     /// File of suspects beside the rig file: terms as expressions that may be missing, candidates beside the effects.
     #[arg(long, value_name = "FILE")]
-    pub suspects: Option<PathBuf>,
+    pub(crate) suspects: Option<PathBuf>,
     /// Give each explanation its marginal likelihood beside the probability that decides.
     #[arg(long)]
-    pub marginal_likelihoods: bool,
+    pub(crate) marginal_likelihoods: bool,
     /// Of a model file: wherever no suspect is named, search for terms that none of them describes; without it, where more
     /// than noise is left.
     #[arg(long)]
-    pub discover: bool,
+    pub(crate) discover: bool,
     /// Of a model file: no such search.
     #[arg(long, conflicts_with = "discover")]
-    pub no_discover: bool,
+    pub(crate) no_discover: bool,
 }
 
 /// What the whole workflow is given.
 #[derive(Args, Clone, Debug)]
-pub struct CloseArguments {
+pub(crate) struct CloseArguments {
     /// What naming is given.
     #[command(flatten)]
-    pub name: NameArguments,
+    pub(crate) name: NameArguments,
     /// Held-out record, used only to judge the model; a model file accepts several.
     #[arg(long, num_args = 1..)]
-    pub test: Vec<PathBuf>,
+    pub(crate) test: Vec<PathBuf>,
 }
 
 /// What is explained.
 #[derive(Args, Clone, Debug)]
-pub struct ExplainArguments {
+pub(crate) struct ExplainArguments {
     /// Model file.
-    pub model: PathBuf,
+    pub(crate) model: PathBuf,
     /// Records that the model is fitted to.
     #[arg(long, num_args = 1..)]
-    pub train: Vec<PathBuf>,
+    pub(crate) train: Vec<PathBuf>,
     /// A page of it beside the text: equations set, inputs, states, outputs, numbers with their units, suspects.
     #[arg(long, value_name = "FILE")]
-    pub html: Option<PathBuf>,
+    pub(crate) html: Option<PathBuf>,
 }
 
 /// What is simulated.
 #[derive(Args, Clone, Debug)]
-pub struct SimulateArguments {
+pub(crate) struct SimulateArguments {
     /// Model file.
-    pub model: PathBuf,
+    pub(crate) model: PathBuf,
     /// Record whose inputs drive it.
     #[arg(long)]
-    pub record: PathBuf,
+    pub(crate) record: PathBuf,
     /// New table: the columns of the record that the model reads, and NAME_model for each output.
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// What a model file begins from.
 #[derive(Args, Clone, Debug)]
-pub struct NewArguments {
+pub(crate) struct NewArguments {
     /// Record: a text table with names above its columns.
-    pub record: PathBuf,
+    pub(crate) record: PathBuf,
     /// Columns that drive the plant, separated by commas; the role of all others is guessed.
     #[arg(long, value_delimiter = ',', value_name = "COLUMN")]
-    pub inputs: Vec<String>,
+    pub(crate) inputs: Vec<String>,
     /// Columns that are measured of it.
     #[arg(long, value_delimiter = ',', value_name = "COLUMN")]
-    pub outputs: Vec<String>,
+    pub(crate) outputs: Vec<String>,
     /// The new model file; without it the text is printed.
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// Which suspects are listed.
 #[derive(Args, Clone, Debug)]
-pub struct SuspectsArguments {
+pub(crate) struct SuspectsArguments {
     /// A library, such as friction, or one suspect of it, such as friction/stribeck; of a library of your own its file, and
     /// FILE.toml/SUSPECT. Without it all that ship are listed, a line each.
-    pub name: Option<String>,
+    pub(crate) name: Option<String>,
 }
 
 /// What a rig file is extended by.
 #[derive(Args, Clone, Debug)]
-pub struct ExtendArguments {
+pub(crate) struct ExtendArguments {
     /// Rig file or model file that the report was made with.
     #[arg(long, visible_alias = "model")]
-    pub rig: PathBuf,
+    pub(crate) rig: PathBuf,
     /// report.json.
     #[arg(long)]
-    pub report: PathBuf,
+    pub(crate) report: PathBuf,
     /// The new rig file or model file.
     #[arg(long)]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 /// What is judged on what.
 #[derive(Args, Clone, Debug)]
-pub struct VerifyArguments {
+pub(crate) struct VerifyArguments {
     /// Rig file before.
     #[arg(long)]
-    pub rig: PathBuf,
+    pub(crate) rig: PathBuf,
     /// Rig file after.
     #[arg(long)]
-    pub extended: PathBuf,
+    pub(crate) extended: PathBuf,
     /// The held-out record.
     #[arg(long)]
-    pub test: PathBuf,
+    pub(crate) test: PathBuf,
     #[command(flatten)]
     pub(crate) read: ReadArguments,
     /// Folder for verification.json, made if missing; without it nothing is written.
     #[arg(long)]
-    pub out: Option<PathBuf>,
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// What is to be distinguished.
 #[derive(Args, Clone, Debug)]
-pub struct NextArguments {
+pub(crate) struct NextArguments {
     /// Rig file that the report was made with.
     #[arg(long)]
-    pub rig: PathBuf,
+    pub(crate) rig: PathBuf,
     /// report.json with the verdict ambiguous.
     #[arg(long)]
-    pub report: PathBuf,
+    pub(crate) report: PathBuf,
     /// The experiment file.
     #[arg(long)]
-    pub out: PathBuf,
+    pub(crate) out: PathBuf,
 }
 
 #[cfg(test)]

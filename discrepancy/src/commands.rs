@@ -35,7 +35,9 @@ use text::{in_words, quantity_in_words, significant};
 /// Keys without which the report of a rig file says nothing of an extended one.
 const OF_RIG: [&str; 3] = ["named", "parameters", "inputs"];
 
+/// Why a command ends without a result; the program then exits as for bad input.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum CommandError {
     #[error(transparent)]
     Workflow(#[from] WorkflowError),

@@ -99,6 +99,7 @@ struct Group {
 
 /// The model to which a term is added.
 pub struct ReferenceModel<'a> {
+    /// Its effects, fitted; none for the baseline.
     pub effects: &'a [EffectEstimate],
     /// Of the baseline parameters, in the order of [`crate::parameters::PARAMETERS`].
     pub factors: [f64; COUNT],

@@ -37,12 +37,14 @@ type Sensitivities = (RigParameters, [f64; COUNT], Vec<Vec<f64>>);
 /// Records, windows and the baseline rig.
 #[derive(Debug)]
 pub struct Engine<'a> {
+    /// Windows of each record, in the order of the records.
     pub windows: Vec<Windows<'a>>,
+    /// The baseline, as the rig file has it.
     pub rig: RigParameters,
     /// Whether each axis of a window counts as a window, the drive first.
     pub(crate) axis_by_axis: bool,
     /// Length of the residual vector of a window.
-    pub rows: usize,
+    pub(crate) rows: usize,
     /// Degrees of freedom of each window times the common variance factor.
     pub scaled_dof: Vec<f64>,
     /// Common variance factor of the noise, by the quietest windows.
@@ -175,12 +177,12 @@ impl<'a> Engine<'a> {
     }
 
     /// Runs of `rig` in all windows with the steps of the search, kept for [`Engine::simulate_where`].
-    pub fn reference_runs(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
+    pub(crate) fn reference_runs(&self, rig: &RigParameters) -> Vec<ReferenceRun> {
         parallel::map(&self.windows, |windows| windows.reference_run(rig))
     }
 
     /// Readings of a neighbour of the reference rig: [`Windows::simulate_where`].
-    pub fn simulate_where(
+    pub(crate) fn simulate_where(
         &self,
         rig: &RigParameters,
         passed: &[ReferenceRun],

@@ -30,15 +30,16 @@ use toml_edit::Document;
 /// An effect to be switched on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Addition {
-    pub effect: String,
+    pub(crate) effect: String,
     /// `drive`, `drive.a` and so on.
-    pub place: String,
+    pub(crate) place: String,
     /// Keys of its sheet, values in the file's units, standard errors; keys left out keep their value or get their default.
-    pub numbers: Vec<(String, f64, Option<f64>)>,
+    pub(crate) numbers: Vec<(String, f64, Option<f64>)>,
 }
 
 /// Why a rig file cannot be extended.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum ExtendError {
     #[error(transparent)]
     Rig(ParameterError),

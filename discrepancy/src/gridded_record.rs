@@ -45,25 +45,27 @@ const JITTER_SPEED_M_PER_S: f64 = 0.1;
 /// Longest run of missing commands in a window.
 pub(crate) const HELD_LONGEST: usize = 3;
 
+/// Inputs, readings and smoothed states of a record on its grid.
 #[derive(Clone, Debug, Default)]
 pub struct GriddedRecord {
-    pub name: String,
+    pub(crate) name: String,
+    /// Whether the rods of the axes are linked.
     pub linked: bool,
     /// Weights on the carriage, kg.
-    pub added_mass_kg: f64,
+    pub(crate) added_mass_kg: f64,
     /// Which axes were measured, drive and load.
     pub measured: [bool; 2],
-    pub inputs: Vec<Inputs>,
+    pub(crate) inputs: Vec<Inputs>,
     /// Readings at the start of each period, in the order of [`SIGNALS`], rig coordinates, the load's offset taken off.
-    pub samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
+    pub(crate) samples: Vec<[[Option<f64>; CHANNELS]; 2]>,
     /// Smoothed state of each axis at the start of each period.
-    pub smoothed_states: Vec<[AxisState; 2]>,
+    pub(crate) smoothed_states: Vec<[AxisState; 2]>,
     /// What each axis remembers at the start of each period.
     pub(crate) memories: Vec<[Memory; 2]>,
     /// Standard deviation of each reading, its rounding included.
-    pub noise: [[f64; CHANNELS]; 2],
+    pub(crate) noise: [[f64; CHANNELS]; 2],
     /// Lag-1 autocorrelation of the noise, 0 to 1.
-    pub lag1_autocorrelation: [[f64; CHANNELS]; 2],
+    pub(crate) lag1_autocorrelation: [[f64; CHANNELS]; 2],
     pub(crate) jitter_s: f64,
     /// Periods without a known command or without a smoothed state.
     pub(crate) excluded_periods: Vec<bool>,
@@ -74,6 +76,7 @@ pub struct GriddedRecord {
 /// Mechanical state and pressures of an axis, along its extension.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisState {
+    /// Extension of the rod, 0 to the stroke, m; of the load it grows against the rig's position.
     pub extension_m: f64,
     /// Its rate, m/s; exactly 0 at rest.
     pub rod_velocity_m_per_s: f64,
@@ -101,6 +104,7 @@ impl AxisState {
 
 /// Why a record cannot be simulated.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum GriddingError {
     #[error(
         "{file}: no column {column}: the simulation of an axis needs valve, position, force and both pressures"
@@ -114,7 +118,7 @@ pub enum GriddingError {
 
 impl GriddingError {
     /// The column that it is about.
-    pub fn column(&self) -> Option<&str> {
+    pub(crate) fn column(&self) -> Option<&str> {
         match self {
             GriddingError::Missing { column, .. } => Some(column),
             GriddingError::NoAxis { .. } | GriddingError::Short { .. } => None,
@@ -176,10 +180,12 @@ impl GriddedRecord {
         Ok(gridded)
     }
 
+    /// Number of periods of 1 ms.
     pub fn len(&self) -> usize {
         self.inputs.len()
     }
 
+    /// Whether it has no period.
     pub fn is_empty(&self) -> bool {
         self.inputs.is_empty()
     }

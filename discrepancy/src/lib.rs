@@ -27,6 +27,8 @@
 //! | [`workflow`] | the steps in order |
 //! | [`commands`], [`cli`], `folder` | the program |
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod calibrate;
 pub mod candidates;
 pub mod check;

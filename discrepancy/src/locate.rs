@@ -64,9 +64,10 @@ const SERIES: usize = 1500;
 /// Regressor of an unknown input.
 #[derive(Clone, Copy, Debug)]
 pub struct WindowVariable {
+    /// As in reports, `|v|` or `p_a-p_b`.
     pub name: &'static str,
     /// Its unit; empty for a number.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// Complexity: of variables that explain nearly as much the simplest comes first.
     pub(crate) complexity: usize,
     /// Nodes in a formula.
@@ -80,21 +81,24 @@ const fn variable(name: &'static str, unit: &'static str, complexity: usize, nod
 /// Where baseline and records disagree.
 #[derive(Clone, Debug)]
 pub struct Located {
+    /// For the report: balances, regimes, maps and series.
     pub location: Location,
     /// Unknown inputs, one series for each observable balance.
     pub unknowns: Vec<UnknownSeries>,
 }
 
+/// Unknown input of one balance over time.
 #[derive(Clone, Debug)]
 pub struct UnknownSeries {
     /// As in [`BalanceBar::balance`].
     pub balance: String,
     /// N or Nl/min.
-    pub unit: &'static str,
+    pub(crate) unit: &'static str,
     /// Windows in which it is observable, in the order of the records.
     pub points: Vec<UnknownPoint>,
 }
 
+/// Unknown input of a balance in one window.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownPoint {
     /// Index of its window of 20 ms in the record.
@@ -112,7 +116,7 @@ pub struct UnknownPoint {
 
 impl UnknownSeries {
     /// As in [`BalanceBar::birge_ratio`]. `None` without a point.
-    pub fn birge_ratio(&self) -> Option<f64> {
+    pub(crate) fn birge_ratio(&self) -> Option<f64> {
         birge_ratio(self.points.iter())
     }
 }

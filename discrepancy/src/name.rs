@@ -82,30 +82,33 @@ const MIN_AMPLITUDE_RATIO: f64 = 0.85;
 
 /// An effect that explains the records as well as one of the model.
 #[derive(Clone, Debug)]
-pub struct Alternative {
+pub(crate) struct Alternative {
     /// The model with it as the last effect, fitted in the round in which the other one joined.
-    pub fit: Refit,
+    pub(crate) fit: Refit,
     /// Share of the excess that it removes.
-    pub share: f64,
+    pub(crate) share: f64,
 }
 
+/// Outcome of the selection of effects on some records.
 #[derive(Debug)]
 pub struct SelectionResult {
     /// Calibration: parameters without effects.
     pub(crate) calibrated: Refit,
+    /// The selected model, whether its effects are named or not; the calibration where none was selected.
     pub model: Refit,
     /// The model to report: parameters that it does not need are back at the rig file's values. Where the model is no
     /// explanation, the calibration alone.
     pub reported: Refit,
-    pub alternatives: Vec<Vec<Alternative>>,
+    pub(crate) alternatives: Vec<Vec<Alternative>>,
     /// Share of the excess that each effect removes.
     pub shares: Vec<f64>,
     /// First screening of all candidates, best first.
     pub(crate) screened: Vec<ScreenedCandidate>,
     /// All fits, each with its candidate as the last effect.
-    pub fitted: Vec<Refit>,
+    pub(crate) fitted: Vec<Refit>,
     /// 99th percentile of the largest gain of any candidate under the null distribution.
     pub(crate) threshold: f64,
+    /// Candidates with their whitened responses; `limits` is in their order.
     pub columns: Columns,
     /// Loss of the parameters alone, linearised.
     pub(crate) calibrated_loss: f64,
@@ -120,7 +123,7 @@ pub struct SelectionResult {
     /// Why the effects of the model are not named.
     pub not_explained: Option<NotExplained>,
     /// Whether each effect of the model has a name.
-    pub is_named: Vec<bool>,
+    pub(crate) is_named: Vec<bool>,
     /// Explanations compared, the null model first.
     pub explanations: Vec<Explanation>,
     /// Of the set that is named, or would be.

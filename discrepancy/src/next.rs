@@ -29,13 +29,13 @@
 //! the rehearsals five. Source: discrepancy-notes.md, pipeline 9; Hunter and Reiner 1965; Atkinson and Fedorov 1975, Biometrika
 //! 62(1): T-optimality.
 
-pub mod choice;
+mod choice;
 pub mod closed_loop;
 pub(crate) mod divergence;
 pub mod menu;
 pub mod noise;
 pub(crate) mod nuisance;
-pub mod refits;
+mod refits;
 pub(crate) mod remedies;
 
 use crate::engine::Engine;
@@ -72,9 +72,9 @@ impl Explanation {
 /// T of each ordered pair of explanations in one entry of the menu.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExperimentDivergences {
-    pub name: &'static str,
+    pub(crate) name: &'static str,
     /// For each ordered pair: the true explanation, the alternative, their divergence.
-    pub pairs: Vec<(usize, usize, Divergence)>,
+    pub(crate) pairs: Vec<(usize, usize, Divergence)>,
 }
 
 /// The proposed experiment and its file, and the rehearsed menu.
@@ -85,7 +85,7 @@ pub struct Proposal {
     /// Text of the experiment file, if one is proposed.
     pub(crate) experiment_toml: Option<String>,
     /// All entries of the menu that can be rehearsed, the best first.
-    pub rehearsed: Vec<RehearsedEntry>,
+    pub(crate) rehearsed: Vec<RehearsedEntry>,
 }
 
 impl ExperimentDivergences {
@@ -102,11 +102,14 @@ impl ExperimentDivergences {
 /// What is proposed for.
 #[derive(Clone, Copy)]
 pub struct Question<'a> {
+    /// The rig file's rig, whose numbers the controllers have.
     pub baseline: &'a RigParameters,
+    /// Models to tell apart; fewer than two need no experiment.
     pub explanations: &'a [Explanation],
     /// Drive and load. The new record will be used together with the present ones, on their common axes; where that is one axis,
     /// entries with linked rods are left out.
     pub axes_measured: [bool; 2],
+    /// Sensor noise of the rehearsed records.
     pub noise: &'a ReadingNoise,
     /// The training records; without them the explanations are taken as exact.
     pub training: Option<&'a Engine<'a>>,

@@ -56,7 +56,7 @@ pub(crate) struct Trace {
 }
 
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pictures {
+pub(crate) struct Pictures {
     pub(crate) record: String,
     pub(crate) held_out: bool,
     pub(crate) traces: Vec<Trace>,

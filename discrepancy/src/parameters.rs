@@ -12,7 +12,7 @@ pub struct Parameter {
     /// Name in reports.
     pub name: &'static str,
     /// Keys of the rig file that it scales, the reported one first.
-    pub keys: &'static [&'static str],
+    pub(crate) keys: &'static [&'static str],
     /// Prior standard deviation of its factor.
     pub prior_std: f64,
 }
@@ -53,6 +53,7 @@ pub const PARAMETERS: [Parameter; 9] = [
 const SLIDING: &str = "friction.sliding_force_n";
 const BREAK_AWAY: &str = "friction.break_away_force_n";
 
+/// Number of baseline parameters.
 pub const COUNT: usize = PARAMETERS.len();
 
 impl Parameter {

@@ -30,8 +30,10 @@ const PARAMETER_COSTS: f64 = EFFECT_PARAMETER_PENALTY;
 /// Relative deviation at which half of the penalty is due.
 const COUNTS_AS_OFF: f64 = 0.005;
 
+/// A candidate with fitted numbers, or those from which a fit starts.
 #[derive(Clone, Debug)]
 pub struct EffectEstimate {
+    /// The effect or suspect, and its place.
     pub candidate: Candidate,
     /// One for each key of its sheet.
     pub coordinates: Vec<f64>,
@@ -40,7 +42,9 @@ pub struct EffectEstimate {
 /// A fitted model: effects and parameters.
 #[derive(Clone, Debug)]
 pub struct Refit {
+    /// In the order in which they joined.
     pub effects: Vec<EffectEstimate>,
+    /// Factors of the baseline parameters, in the order of [`PARAMETERS`]; 1 is the rig file's value.
     pub factors: [f64; COUNT],
     /// The loss with priors and, of fits that are compared, a penalty for each number of an effect and each parameter that is
     /// off; a reported model (`name::gauss_newton::fit_selected`) has no penalties in it.
@@ -93,8 +97,8 @@ pub(crate) fn is_at_bound(effects: &[EffectEstimate]) -> bool {
 #[derive(Clone, Debug)]
 pub struct Linearisation {
     /// Sensitivities to the parameters.
-    pub columns: Vec<Vec<f64>>,
-    pub factors: [f64; COUNT],
+    pub(crate) columns: Vec<Vec<f64>>,
+    pub(crate) factors: [f64; COUNT],
 }
 
 impl Linearisation {
@@ -105,7 +109,7 @@ impl Linearisation {
     }
 
     /// Deviations of the parameters from the prior means.
-    pub fn deviations(&self) -> Vec<f64> {
+    pub(crate) fn deviations(&self) -> Vec<f64> {
         self.factors.iter().map(|factor| factor - 1.0).collect()
     }
 }
@@ -200,7 +204,11 @@ impl Iterate for ProjectedFit {
 /// Fits effects from a start.
 ///
 /// `None` where no rig can have the start.
-pub fn refit(engine: &Engine<'_>, linearisation: &Linearisation, start: &[EffectEstimate]) -> Option<Refit> {
+pub(crate) fn refit(
+    engine: &Engine<'_>,
+    linearisation: &Linearisation,
+    start: &[EffectEstimate],
+) -> Option<Refit> {
     refit_steps(engine, linearisation, start, CANDIDATE.steps)
 }
 

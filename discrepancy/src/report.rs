@@ -4,6 +4,7 @@ use crate::refit::EffectEstimate;
 use plant::effects::sheet::{Part, Place};
 pub use runlog::discrepancy_report::*;
 
+/// A place of the plant as reports write it.
 #[must_use]
 pub fn place_of(place: Place) -> RigPlace {
     let named = RigPlace::named(&place.to_string());

@@ -16,8 +16,10 @@ pub(crate) const COLUMN_PENALTY: f64 = 6.0;
 /// Prior precision of a column's coefficient, which is about 1: it keeps the equations regular.
 const COLUMN_PRECISION: f64 = 1e-2;
 
+/// Candidates with the whitened responses to their probes.
 #[derive(Debug)]
 pub struct Columns {
+    /// In the order in which they were given.
     pub candidates: Vec<Candidate>,
     /// Probes of each candidate, with the indices of their columns.
     pub(crate) probes: Vec<Vec<(Vec<f64>, usize)>>,
@@ -27,16 +29,16 @@ pub struct Columns {
 #[derive(Clone, Debug)]
 pub(crate) struct ScreenedCandidate {
     /// Index in [`Columns::candidates`].
-    pub at: usize,
+    pub(crate) at: usize,
     /// Loss with it.
-    pub loss: f64,
+    pub(crate) loss: f64,
     /// Where its fit starts.
-    pub start: EffectEstimate,
+    pub(crate) start: EffectEstimate,
 }
 
 impl Columns {
     /// Simulates all probes of some candidates.
-    pub fn new(engine: &Engine<'_>, candidates: Vec<Candidate>) -> Self {
+    pub(crate) fn new(engine: &Engine<'_>, candidates: Vec<Candidate>) -> Self {
         let baseline = engine.simulate_coarsely(&engine.rig);
         let tasks: Vec<(usize, Vec<f64>)> = candidates
             .iter()
@@ -64,7 +66,7 @@ impl Columns {
     }
 
     /// Whitened response to a probe.
-    pub fn column(&self, index: usize) -> &[f64] {
+    pub(crate) fn column(&self, index: usize) -> &[f64] {
         &self.columns[index]
     }
 

@@ -19,9 +19,10 @@ use std::path::Path;
 /// A suspect with its data sheet.
 #[derive(Debug)]
 pub struct Suspect {
+    /// The term as the file declares it, a library's law written out.
     pub declared: Declared,
-    pub sheet: Sheet,
-    pub place: Place,
+    pub(crate) sheet: Sheet,
+    pub(crate) place: Place,
 }
 
 /// Reads a file of suspects, which may use libraries as a model file does. What is read lives as long as the program, as the

@@ -43,14 +43,14 @@ const FINE_SUBSTEPS: u32 = 20;
 /// The windows of a record, with the subspaces that their start states span.
 #[derive(Clone, Debug)]
 pub struct Windows<'a> {
-    pub record: &'a GriddedRecord,
-    pub rig: RigParameters,
+    pub(crate) record: &'a GriddedRecord,
+    pub(crate) rig: RigParameters,
     /// First period of each window.
     pub(crate) starts: Vec<usize>,
     /// Start state of each window, unjudged ones included.
     points: Vec<[AxisState; 2]>,
     /// Axis and channel of each output.
-    pub outputs: Vec<(usize, usize)>,
+    pub(crate) outputs: Vec<(usize, usize)>,
     /// Readings over their noise by window, period and output; 0 where there is none.
     readings: Vec<f64>,
     valid: Vec<bool>,
@@ -111,7 +111,7 @@ impl<'a> Windows<'a> {
     }
 
     /// Length of the residual vector of a window.
-    pub fn rows(&self) -> usize {
+    pub(crate) fn rows(&self) -> usize {
         WINDOW * self.outputs.len()
     }
 
@@ -146,7 +146,7 @@ impl<'a> Windows<'a> {
     }
 
     /// Noise-free readings of a rig over their noise.
-    pub fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
+    pub(crate) fn simulate(&self, rig: &RigParameters) -> Vec<f64> {
         self.run(vec![self.plant(rig)]).remove(0)
     }
 
@@ -193,7 +193,7 @@ impl<'a> Windows<'a> {
     }
 
     /// Whitened residual of a simulation, force spikes removed and start states projected out.
-    pub fn residual(&self, simulated: &[f64]) -> Vec<f64> {
+    pub(crate) fn residual(&self, simulated: &[f64]) -> Vec<f64> {
         let mut left = self.raw_residual(simulated);
         self.project_windows(&mut left);
         left
@@ -208,7 +208,7 @@ impl<'a> Windows<'a> {
     }
 
     /// Difference of two simulations, processed like a residual.
-    pub fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
+    pub(crate) fn difference(&self, simulated: &[f64], from: &[f64]) -> Vec<f64> {
         let mut differs: Vec<f64> = simulated.iter().zip(from).map(|(value, from)| value - from).collect();
         self.reduce(&mut differs);
         differs
@@ -254,7 +254,7 @@ pub(crate) fn axis_by_axis(window: &[f64]) -> Vec<f64> {
 }
 
 /// Projects values on the complement of an orthonormal basis.
-pub fn project(values: &mut [f64], basis: &[Vec<f64>]) {
+pub(crate) fn project(values: &mut [f64], basis: &[Vec<f64>]) {
     for direction in basis {
         let share = dot(values, direction);
         values.iter_mut().zip(direction).for_each(|(value, part)| *value -= share * part);

@@ -32,7 +32,7 @@ pub(crate) use findings::empty;
 use findings::{report_of, summary};
 use model_fit::is_model_file;
 use plant::{Axis, ParameterError, RigParameters};
-pub use proposal::proposal;
+pub(crate) use proposal::proposal;
 use proposal::proposal_for;
 use records::{ReadError, ReadOptions};
 use std::path::{Path, PathBuf};
@@ -40,7 +40,9 @@ use std::path::{Path, PathBuf};
 /// Files and options of `close`.
 #[derive(Clone, Debug, Default)]
 pub struct Task {
+    /// Rig file: the baseline.
     pub rig: PathBuf,
+    /// Training records; the axes that all of them show are fitted.
     pub train: Vec<PathBuf>,
     /// The held-out record.
     pub test: Option<PathBuf>,
@@ -57,19 +59,21 @@ pub struct Task {
 /// Report, extended rig file, series for the page, and proposed experiment.
 #[derive(Debug)]
 pub struct Outcome {
+    /// Content of `report.json`.
     pub report: Report,
     /// The extended rig file; `None` when a record cannot be used.
     pub extended: Option<String>,
     /// Series for the page.
-    pub pictures: Pictures,
+    pub(crate) pictures: Pictures,
     /// File of the proposed experiment.
-    pub experiment: Option<String>,
+    pub(crate) experiment: Option<String>,
     /// Why a given held-out record was not judged.
-    pub not_judged: Option<String>,
+    pub(crate) not_judged: Option<String>,
 }
 
 /// Why the workflow did not run.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum WorkflowError {
     #[error("{file}: {why}")]
     Rig { file: String, why: std::io::Error },
@@ -92,10 +96,12 @@ pub enum WorkflowError {
     Extend(#[from] ExtendError),
 }
 
+/// A rig file that was read: its text, and the rig in it.
 #[derive(Clone, Debug)]
 pub struct RigFile {
-    pub file: String,
-    pub text: String,
+    pub(crate) file: String,
+    pub(crate) text: String,
+    /// Checked against the ranges of all keys.
     pub rig: RigParameters,
 }
 
@@ -119,7 +125,7 @@ impl RigFile {
 /// A checked record, gridded when it can be used.
 #[derive(Debug)]
 pub struct CheckedRecord {
-    pub checked: Checked,
+    pub(crate) checked: Checked,
     /// The gridded record; `None` when it cannot be used.
     pub gridded: Option<GriddedRecord>,
 }

@@ -58,7 +58,9 @@ const MAX_PARAMETERS_MOVED: f64 = 3.0;
 /// Why a model with effects is no explanation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotExplained {
+    /// It leaves more than noise, and its effects are improbable, too small for a name, or remove less than half of the loss.
     TooLittle,
+    /// More than [`MAX_SIGNIFICANTLY_OFF`] baseline parameters are significantly off beside it.
     TooManyParametersOff,
     /// Why, in words after the effects.
     NotSignificant(&'static str),

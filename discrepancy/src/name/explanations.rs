@@ -30,9 +30,11 @@ const ALIKE_COSINE: f64 = 0.95;
 /// An explanation and its features; none of these has none.
 #[derive(Clone, Debug)]
 pub struct Explanation {
+    /// Nothing, parameters alone, effects, or none of these.
     pub kind: ExplanationKind,
     /// Sets of effects that these records cannot tell apart, the best first.
     pub sets: Vec<Vec<EffectEstimate>>,
+    /// Of the best set, or of the model without effects; `None` for none of these.
     pub features: Option<Features>,
     /// Of the best set of effects, small ones beside them included.
     pub(super) fit: Option<Refit>,

@@ -39,7 +39,7 @@ const LEAST_RISE: f64 = 0.05;
 
 /// A probability from trials, with its interval of 95 %.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Probability {
+pub(crate) struct Probability {
     pub(crate) value: f64,
     pub(crate) low: f64,
     pub(crate) high: f64,
@@ -62,13 +62,13 @@ impl Probability {
 
 /// An entry of the menu with its trials.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RehearsedEntry {
-    pub name: &'static str,
-    pub trials: Vec<Trial>,
+pub(crate) struct RehearsedEntry {
+    pub(crate) name: &'static str,
+    pub(crate) trials: Vec<Trial>,
     /// Without initial positioning, s.
-    pub length_s: f64,
+    pub(crate) length_s: f64,
     /// Least distance of a moved rod from the ends of its stroke, m.
-    pub clearance_m: f64,
+    pub(crate) clearance_m: f64,
 }
 
 impl RehearsedEntry {

@@ -34,6 +34,7 @@ const UNSETTLED: [&str; 6] = [
 
 /// Why an experiment cannot be rehearsed.
 #[derive(Debug, thiserror::Error)]
+#[allow(missing_docs)] // the message of each says what it is
 pub enum ClosedLoopError {
     #[error(transparent)]
     Files(#[from] InputError),
@@ -43,12 +44,15 @@ pub enum ClosedLoopError {
     Setup(#[from] SetupError),
 }
 
+/// A rehearsed run, period by period of 1 ms.
 #[derive(Clone, Debug)]
 pub struct ClosedLoopRun {
-    pub linked: bool,
+    pub(crate) linked: bool,
     /// Weights on the carriage, kg.
-    pub added_mass_kg: f64,
+    pub(crate) added_mass_kg: f64,
+    /// True state of the plant at the start of the first period.
     pub start: State,
+    /// Valve commands of each period, -1 to 1.
     pub inputs: Vec<Inputs>,
     /// True mechanical state and pressures at the start of each period.
     pub points: Vec<[AxisState; 2]>,
@@ -56,7 +60,7 @@ pub struct ClosedLoopRun {
     pub(crate) readings: Vec<[[f64; CHANNELS]; 2]>,
     /// Period in which the experiment began, behind the initial positioning; `None` when it never did.
     pub began: Option<usize>,
-    pub done: bool,
+    pub(crate) done: bool,
 }
 
 impl ClosedLoopRun {

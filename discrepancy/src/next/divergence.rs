@@ -50,7 +50,7 @@ struct ObservedRun {
 
 /// Divergence of an explanation from an alternative.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Divergence {
+pub(crate) struct Divergence {
     /// |J|^2 of the true one, squared standard deviations.
     pub(crate) square: f64,
     /// Cosine of the two signatures, 0 to 1.

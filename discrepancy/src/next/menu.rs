@@ -6,18 +6,20 @@
 use axis_control::setup::Inputs as Files;
 use plant::RigParameters;
 
+/// An experiment of the menu.
 #[derive(Clone, Copy, Debug)]
 pub struct Entry {
     /// Its title, and its file without `.toml`.
     pub name: &'static str,
     /// What it tells apart, as the end of "to tell ... apart".
     pub purpose: &'static str,
+    /// Text of its experiment file.
     pub toml: &'static str,
 }
 
 impl Entry {
     /// Name of the file in which it is proposed.
-    pub fn file(&self) -> String {
+    pub(crate) fn file(&self) -> String {
         format!("next-{}.toml", self.name)
     }
 
@@ -27,6 +29,7 @@ impl Entry {
         files.map_or(f64::INFINITY, |files| files.experiment.duration_s())
     }
 
+    /// Whether its file has the rods linked.
     pub fn is_linked(&self) -> bool {
         self.toml.lines().any(|line| line.trim_end() == "linked = true")
     }
@@ -53,7 +56,7 @@ menu! {
 }
 
 /// Text of a shipped program that the menu uses.
-pub fn program(name: &str) -> Option<String> {
+pub(crate) fn program(name: &str) -> Option<String> {
     let text = match name {
         "position-pid" => include_str!("../../../controller/programs/position-pid.toml"),
         "position-linked" => include_str!("../../../controller/programs/position-linked.toml"),

@@ -15,6 +15,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64;
 use statrs::distribution::{ContinuousCDF, Normal};
 
+/// Standard deviation and lag-1 autocorrelation of each reading, and jitter of the sampling instant.
 #[derive(Clone, Debug)]
 pub struct ReadingNoise {
     /// Standard deviations, SI.

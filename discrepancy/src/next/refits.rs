@@ -30,11 +30,11 @@ use plant::effects::sheet::Part;
 
 /// A rehearsed record and what each explanation leaves of it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Trial {
+pub(crate) struct Trial {
     /// The explanation that made it.
-    pub truth: usize,
+    pub(crate) truth: usize,
     /// Loss of each explanation above that of the truth, shrunk, over the largest difference that is indistinguishable.
-    pub scaled_loss_differences: Vec<f64>,
+    pub(crate) scaled_loss_differences: Vec<f64>,
 }
 
 impl Trial {

@@ -14,7 +14,11 @@ use std::path::Path;
 ///
 /// Noise and errors of the model are those of the training records, where they can still be read as the report names them;
 /// else the noise is the rig file's, and the explanations are taken as exact.
-pub fn proposal(rig_file: &RigFile, reported: &Report, progress: &mut dyn FnMut(&str)) -> Option<Proposal> {
+pub(crate) fn proposal(
+    rig_file: &RigFile,
+    reported: &Report,
+    progress: &mut dyn FnMut(&str),
+) -> Option<Proposal> {
     let records = training(rig_file, reported).unwrap_or_default();
     let engine = (!records.is_empty()).then(|| Engine::new(&records, &rig_file.rig));
     proposal_for(rig_file, reported, engine.as_ref(), progress)
