@@ -100,11 +100,11 @@ pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceE
     let interrupt = Interrupt::watch().map_err(ConformanceError::System)?;
     let began = Instant::now();
     // Dropping it at the end removes the folder.
-    let (url, _own) = match arguments.bus.clone() {
+    let (url, _folder) = match arguments.bus.clone() {
         Some(url) => (url, None),
         None => {
-            let own = TemporaryFolder::new().map_err(ConformanceError::System)?;
-            (own.url(), Some(own))
+            let folder = TemporaryFolder::new().map_err(ConformanceError::System)?;
+            (folder.url(), Some(folder))
         }
     };
     let real = arguments.pace == CheckPace::Real;

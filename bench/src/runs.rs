@@ -41,7 +41,7 @@ impl Run {
     }
 
     pub(crate) fn figure(&self, name: &str) -> Option<f64> {
-        self.figures.iter().find(|(own, _)| *own == name).map(|(_, value)| *value)
+        self.figures.iter().find(|(figure, _)| *figure == name).map(|(_, value)| *value)
     }
 
     /// Start of the experiment, s: time 0 of comparisons.
@@ -103,11 +103,11 @@ pub(crate) fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
 /// The demands of an experiment on the rig: its initial state, its mode, and the set-points of both axes.
 fn demands(experiment: &toml::Table) -> toml::Table {
     // Without `start`: time begins with the experiment, whatever started it.
-    const OWN: [&str; 3] = ["program", "change", "start"];
+    const NO_DEMANDS: [&str; 3] = ["program", "change", "start"];
     let mut demands = toml::Table::new();
     for key in ["rig", "run"].into_iter().chain(Axis::NAMES) {
         if let Some(table) = experiment.get(key).and_then(toml::Value::as_table) {
-            let kept = table.iter().filter(|(key, _)| !OWN.contains(&key.as_str()));
+            let kept = table.iter().filter(|(key, _)| !NO_DEMANDS.contains(&key.as_str()));
             let kept: toml::Table = kept.map(|(key, value)| (key.clone(), value.clone())).collect();
             demands.insert(key.into(), toml::Value::Table(kept));
         }

@@ -227,8 +227,8 @@ fn collected(file: &CampaignFile) -> Vec<String> {
 fn columns(file: &CampaignFile) -> Vec<String> {
     let (before, after) = RESERVED.split_at(3);
     let factors = file.factors.iter().map(|factor| factor.name.clone());
-    let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
-    own(before).into_iter().chain(factors).chain(own(after)).chain(collected(file)).collect()
+    let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect::<Vec<_>>();
+    owned(before).into_iter().chain(factors).chain(owned(after)).chain(collected(file)).collect()
 }
 
 /// A command's program: a path is relative to the campaign's file, a name is looked up in PATH.
@@ -256,9 +256,9 @@ fn campaign_hash(file: &CampaignFile, inputs: Option<&CampaignInputs>) -> String
 
 /// Hash of the executables: this program, and those that it starts.
 fn program_hash(file: &CampaignFile, install_paths: &InstallPaths) -> Result<String, CampaignError> {
-    let own =
+    let executable =
         std::env::current_exe().map_err(|error| CampaignError::Program("this program".into(), error))?;
-    let mut programs = vec![own];
+    let mut programs = vec![executable];
     if let Kind::Experiment(ExperimentKind { pace: Pace::Lockstep, .. }) = &file.kind {
         programs.extend(["emulator", "controller"].map(|name| install_paths.programs.join(name)));
     }

@@ -75,8 +75,8 @@ fn say(line: &str) {
 }
 
 fn read(common: &CommonArguments) -> Result<Campaign, CommandError> {
-    let own = || std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned()));
-    let programs = common.programs.clone().or_else(own).unwrap_or_default();
+    let program_folder = || std::env::current_exe().ok().and_then(|path| Some(path.parent()?.to_owned()));
+    let programs = common.programs.clone().or_else(program_folder).unwrap_or_default();
     let install_paths = InstallPaths { shipped: common.shipped.clone(), programs };
     Ok(Campaign::read(&common.file, &install_paths)?)
 }

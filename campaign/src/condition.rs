@@ -124,7 +124,7 @@ impl<'p> ValuesByTarget<'p> {
     }
 
     fn file(&self, choice: FileChoice) -> Option<&'p str> {
-        self.files.iter().find(|(own, _)| *own == choice).map(|(_, name)| *name)
+        self.files.iter().find(|(changed, _)| *changed == choice).map(|(_, name)| *name)
     }
 
     /// The fault script; numbers of one fault at one place form one entry.
@@ -146,8 +146,8 @@ impl<'p> ValuesByTarget<'p> {
             if let Some(to_s) = fault.to_s {
                 let _ = writeln!(text, "to_s = {to_s:?}");
             }
-            for (own, number) in self.faults.iter().filter(|(other, _)| same(other)) {
-                let _ = writeln!(text, "{} = {number}", own.key);
+            for (fault_number, value) in self.faults.iter().filter(|(other, _)| same(other)) {
+                let _ = writeln!(text, "{} = {value}", fault_number.key);
             }
         }
         text

@@ -176,7 +176,7 @@ impl CampaignFile {
 
     /// Checks that the columns of the page are factors or collected.
     fn check_shown(&self, collect: &Section<'_>) -> Result<(), SettingsError> {
-        let own = |name: &String| {
+        let is_column = |name: &String| {
             self.figures.contains(name)
                 || self.factors.iter().any(|factor| factor.name == *name)
                 || (matches!(self.kind, Kind::Experiment(_)) && is_figure(name))
@@ -184,7 +184,7 @@ impl CampaignFile {
         let worst = self.worst.iter().map(std::slice::from_ref).enumerate().map(|item| ("worst", item));
         let confusion = self.confusion.iter().map(|pair| &pair[..]).enumerate();
         for (key, (place, names)) in worst.chain(confusion.map(|item| ("confusion", item))) {
-            if let Some(name) = names.iter().find(|name| !own(name)) {
+            if let Some(name) = names.iter().find(|name| !is_column(name)) {
                 let problem = format!("{name} is neither varied nor collected");
                 return Err(collect.refused_item(key, place, &problem));
             }

@@ -78,7 +78,7 @@ fn endings(results: &Results) -> String {
     let mut rows = Vec::new();
     if let Some(ended) = results.words("ended") {
         for (place, word) in ended.known.iter().enumerate() {
-            let count = ended.places.iter().filter(|own| **own as usize == place).count();
+            let count = ended.places.iter().filter(|run_place| **run_place as usize == place).count();
             rows.push(vec![format!("ended: {word}"), share(count)]);
         }
     }

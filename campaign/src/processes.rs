@@ -109,7 +109,7 @@ fn outcome(folder: &Path, codes: &[(&str, Option<i32>)]) -> Result<Outcome, Summ
         at_top.chain(of_table).map(|(name, value)| (name, Value::Number(value))).collect();
     let controller = summary.by_controllers.as_ref().and_then(|all| all.controller.as_ref());
     let why = || controller.and_then(|controller| controller.ended_because.clone()).unwrap_or_default();
-    let code = |name: &str| codes.iter().find(|(own, _)| *own == name).and_then(|(_, code)| *code);
+    let code = |name: &str| codes.iter().find(|(program, _)| *program == name).and_then(|(_, code)| *code);
     let (ended, because) = match (code("emulator"), code("controller")) {
         (Some(0), Some(0)) => (EndState::Done, String::new()),
         (Some(0), Some(3)) => (EndState::TimeOver, why()),

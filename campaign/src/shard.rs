@@ -96,7 +96,7 @@ mod tests {
 
     fn shard(text: &str, variable: Option<(&str, &str)>) -> Result<Shard, ShardError> {
         let reported =
-            |name: &str| variable.filter(|(own, _)| *own == name).map(|(_, value)| value.to_owned());
+            |name: &str| variable.filter(|(key, _)| *key == name).map(|(_, value)| value.to_owned());
         text.parse::<ShardArgument>()?.shard(reported)
     }
 

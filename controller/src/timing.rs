@@ -80,7 +80,7 @@ struct WakeUp {
 /// Stamps wake-ups and assembles the rows.
 pub(crate) struct Stopwatch<C> {
     clock: C,
-    own: [bool; 2],
+    controlled: [bool; 2],
     wakes: Axis,
     senders: TimingSenders,
     account: StopwatchAccount,
@@ -101,10 +101,10 @@ impl<C: Clock> Stopwatch<C> {
     /// Without axes.
     pub(crate) fn new(clock: C, axes: &[Axis], senders: TimingSenders) -> Self {
         let wakes = *axes.first().expect("a process controls an axis");
-        let own = Axis::ALL.map(|axis| axes.contains(&axis));
+        let controlled = Axis::ALL.map(|axis| axes.contains(&axis));
         Self {
             clock,
-            own,
+            controlled,
             wakes,
             senders,
             account: StopwatchAccount::default(),
@@ -128,7 +128,7 @@ impl<C: Clock> Stopwatch<C> {
     /// A frame was taken that had arrived at `stamp_ns`; `sensors` is the axis whose sensors it carries.
     pub(crate) fn frame_taken(&mut self, frame: &CanFrame, stamp_ns: u64, sensors: Option<Axis>) {
         self.queue_frame(StampedFrame { stamp_ns, frame: *frame, sent: false });
-        let Some(axis) = sensors.filter(|axis| self.own[axis.index()]) else { return };
+        let Some(axis) = sensors.filter(|axis| self.controlled[axis.index()]) else { return };
         self.arrived_ns[axis.index()] = stamp_ns;
         if axis == self.wakes && stamp_ns < self.began_ns {
             self.account.before_start += 1;
@@ -165,7 +165,7 @@ impl<C: Clock> Stopwatch<C> {
         }
         if let Some(row) = &mut self.pending {
             let missing = [row.drive, row.load].map(|exchange| exchange.sensors_ns == 0);
-            if self.own.iter().zip(missing).all(|(own, missing)| !own || !missing) {
+            if self.controlled.iter().zip(missing).all(|(controlled, missing)| !controlled || !missing) {
                 row.vitals = vitals();
                 self.flush();
             }

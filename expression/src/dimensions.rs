@@ -133,8 +133,8 @@ pub trait Dimensions {
     /// # Errors
     /// [`ExpressionError`] with the byte of the file.
     fn call(&mut self, name: &str, arguments: &[NodeId], at: usize, scope: Self::Scope) -> Result<Measure> {
-        let own = self.arguments(name);
-        let least = match (own, function(name)) {
+        let of_file = self.arguments(name);
+        let least = match (of_file, function(name)) {
             (Some(count), _) => count,
             _ if name == "not" => 1,
             (_, Some((_, least))) => least,
@@ -146,7 +146,7 @@ pub trait Dimensions {
                 return Err(ExpressionError::new(at, format!("'{name}' is no function; known are {known}")));
             }
         };
-        let takes_more = own.is_none() && matches!(name, "min" | "max");
+        let takes_more = of_file.is_none() && matches!(name, "min" | "max");
         if arguments.len() < least || !takes_more && arguments.len() > least {
             let more = if takes_more { " or more" } else { "" };
             return Err(ExpressionError::new(
@@ -156,7 +156,7 @@ pub trait Dimensions {
         }
         let measures =
             arguments.iter().map(|argument| self.node(*argument, scope)).collect::<Result<Vec<_>, _>>()?;
-        if own.is_some() {
+        if of_file.is_some() {
             return self.called(name, &measures, at);
         }
         match name {

@@ -86,9 +86,9 @@ fn add_controllers(summary: &mut JoinedSummary, run: &mut JoinedRun, reports: Co
             run.controller = Some(reported.used);
         }
         ControllerReports::Each(each) => {
-            let parted = each.into_iter().map(|(axis, own)| {
+            let parted = each.into_iter().map(|(axis, report)| {
                 let named = |axis: &str| axis.to_owned();
-                ((named(axis), own.figures), (named(axis), own.used))
+                ((named(axis), report.figures), (named(axis), report.used))
             });
             let (figures, used) = parted.unzip();
             by_controllers.controllers = Some(figures);
@@ -135,7 +135,7 @@ fn against(summary: &JoinedSummary, is_rehearsal: bool) -> Vec<String> {
     if let Some(by_controllers) = &summary.by_controllers {
         against.extend(by_controllers.controller.iter().filter_map(|both| ended_badly("controller", both)));
         let each = by_controllers.controllers.iter().flatten();
-        against.extend(each.filter_map(|(axis, own)| ended_badly(&format!("{axis} controller"), own)));
+        against.extend(each.filter_map(|(axis, report)| ended_badly(&format!("{axis} controller"), report)));
     }
     let broken = summary.thresholds.iter().filter(|(_, bound)| !bound.kept);
     against.extend(broken.map(|(name, _)| format!("bound broken: {name}")));

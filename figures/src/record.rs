@@ -79,8 +79,8 @@ pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryErr
     };
     let axes = reports::read(folder)?.axes();
     let of_axis = |axis: Axis| {
-        let own = axes.contains_key(axis.name()).then(|| controller_csv(axis));
-        own.map_or_else(|| Ok(Table::default()), |name| table(&name, CONTROLLER_NUMBERS, CHAINS))
+        let file = axes.contains_key(axis.name()).then(|| controller_csv(axis));
+        file.map_or_else(|| Ok(Table::default()), |name| table(&name, CONTROLLER_NUMBERS, CHAINS))
     };
     Ok(Record {
         drive: of_axis(Axis::Drive)?,

@@ -142,7 +142,7 @@ impl Series {
     /// This less the other where both have a sample of the same time.
     #[must_use]
     pub fn minus(&self, other: &Self) -> Self {
-        self.with(other, |own, other| own - other)
+        self.with(other, |value, other| value - other)
     }
 
     /// The last value at or before `time_s`.
@@ -304,9 +304,9 @@ mod tests {
     #[test]
     fn a_difference_is_taken_where_both_have_a_sample() {
         let series = |samples: &[(f64, f64)]| samples.iter().copied().collect::<Series>();
-        let own = series(&[(0.002, 1.0), (0.003, 2.0), (0.005, 3.0)]);
-        let other = series(&[(0.0, 9.0), (0.001, 9.0), (0.002, 0.5), (0.003, 0.5), (0.004, 0.5)]);
-        assert_eq!(own.minus(&other), series(&[(0.002, 0.5), (0.003, 1.5)]));
+        let minuend = series(&[(0.002, 1.0), (0.003, 2.0), (0.005, 3.0)]);
+        let subtrahend = series(&[(0.0, 9.0), (0.001, 9.0), (0.002, 0.5), (0.003, 0.5), (0.004, 0.5)]);
+        assert_eq!(minuend.minus(&subtrahend), series(&[(0.002, 0.5), (0.003, 1.5)]));
     }
 
     #[test]

@@ -47,8 +47,8 @@ pub(crate) fn compare(runs: &[RunPart]) -> Option<Comparison> {
     for tag in tags {
         for (percentile, of) in FIGURES {
             let values = |group: &String| -> Vec<u64> {
-                let own = runs.iter().zip(&group_of).filter(|(_, of_run)| *of_run == group);
-                own.filter_map(|(run, _)| of(run.percentiles_ns.get(tag)?)).collect()
+                let members = runs.iter().zip(&group_of).filter(|(_, of_run)| *of_run == group);
+                members.filter_map(|(run, _)| of(run.percentiles_ns.get(tag)?)).collect()
             };
             let values: Vec<_> = groups.iter().map(values).collect();
             // A figure that a group lacks compares to nothing.
@@ -62,19 +62,19 @@ pub(crate) fn compare(runs: &[RunPart]) -> Option<Comparison> {
 
 fn cells(values: &[Vec<u64>]) -> Vec<ComparisonCell> {
     let first = &values[0];
-    let cell = |(place, own): (usize, &Vec<u64>)| {
+    let cell = |(place, group_ns): (usize, &Vec<u64>)| {
         let change = || {
-            let (before, after) = (median_ns(first) as f64, median_ns(own) as f64);
+            let (before, after) = (median_ns(first) as f64, median_ns(group_ns) as f64);
             (before > 0.0).then(|| (after / before - 1.0) * 100.0)
         };
         ComparisonCell {
-            median_ns: median_ns(own),
+            median_ns: median_ns(group_ns),
             range_ns: (
-                own.iter().copied().min().unwrap_or_default(),
-                own.iter().copied().max().unwrap_or_default(),
+                group_ns.iter().copied().min().unwrap_or_default(),
+                group_ns.iter().copied().max().unwrap_or_default(),
             ),
             change_percent: if place == 0 { None } else { change() },
-            beyond_noise: if place == 0 { None } else { beyond_noise(first, own) },
+            beyond_noise: if place == 0 { None } else { beyond_noise(first, group_ns) },
         }
     };
     values.iter().enumerate().map(cell).collect()

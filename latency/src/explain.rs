@@ -132,8 +132,8 @@ fn missed_by_controller(place: usize, process: &str, run: &RunFiles, lost: u64) 
     let rows = &run.rows[process];
     let row = &rows[place];
     let recorded_ns = run.recorded_late_ns.get(process).and_then(|reported| reported.get(&row.cycle));
-    let own_ns = row.woke_ns.saturating_sub(row.due_ns);
-    let came_ns = recorded_ns.map(|late_ns| row.woke_ns.saturating_sub((*late_ns).max(own_ns)));
+    let lateness_ns = row.woke_ns.saturating_sub(row.due_ns);
+    let came_ns = recorded_ns.map(|late_ns| row.woke_ns.saturating_sub((*late_ns).max(lateness_ns)));
     // Between dumps of the flight recorder lie cycles that nobody missed.
     let before = place.checked_sub(1).map(|before| &rows[before]).filter(|_| run.whole);
     let Some(before) = before.filter(|before| row.cycle > before.cycle + 1) else {

@@ -17,9 +17,9 @@ const VERSION: u32 = 2;
 /// The file's contents: wake-up latencies of all processes over all runs.
 pub(crate) fn value(sums: &BTreeMap<String, Samples>, runs: &[RunFiles]) -> Value {
     // The rig first.
-    let mut own: Vec<_> = sums.iter().filter(|(tag, _)| tag.ends_with("-wakeup")).collect();
-    own.sort_by_key(|(tag, _)| super::kinds::place(tag));
-    let cpu: Map<_, _> = own
+    let mut wakeups: Vec<_> = sums.iter().filter(|(tag, _)| tag.ends_with("-wakeup")).collect();
+    wakeups.sort_by_key(|(tag, _)| super::kinds::place(tag));
+    let cpu: Map<_, _> = wakeups
         .iter()
         .enumerate()
         .map(|(place, (tag, samples))| (place.to_string(), one(tag, samples)))

@@ -50,9 +50,9 @@ fn all_files_are_written_and_the_log_holds_every_sample() {
     let text = std::fs::read_to_string(out.join("latency.hlog")).unwrap();
     let intervals = hlog::read(&text).unwrap();
     for distribution in &made.report.distributions {
-        let own = intervals.iter().filter(|interval| interval.tag == distribution.name);
+        let tagged = intervals.iter().filter(|interval| interval.tag == distribution.name);
         let mut sum = Samples::default();
-        own.for_each(|interval| sum.add(&interval.samples));
+        tagged.for_each(|interval| sum.add(&interval.samples));
         assert_eq!(sum.count(), distribution.percentiles_ns.count, "{}", distribution.name);
         assert_eq!(sum.percentiles_ns(), distribution.percentiles_ns, "{}", distribution.name);
         let binned: u64 = distribution.bins.iter().map(|bin| bin.count).sum();

@@ -110,8 +110,8 @@ mod tests {
     #[test]
     fn the_pages_own_files_are_short_and_make_no_markup_of_text() {
         // The style of all pages has tests of its own.
-        let own = |path: &str| !path.contains("/vendor/") && path != "/assets/page_style.css";
-        for (path, asset) in ASSETS.iter().filter(|(path, _)| own(path)) {
+        let is_page_file = |path: &str| !path.contains("/vendor/") && path != "/assets/page_style.css";
+        for (path, asset) in ASSETS.iter().filter(|(path, _)| is_page_file(path)) {
             let text = std::str::from_utf8(asset.body).unwrap();
             assert!(text.lines().count() <= 500, "{path}");
             for (line, number) in text.lines().zip(1..) {

@@ -2,8 +2,8 @@
 
 use crate::compile::{frictions_hold, tapes};
 use crate::file::{Change, Expression, Model, Target};
+use crate::file_units::unit_of;
 use crate::names::{DEEPEST_CHAIN, Symbol, chain, resolve};
-use crate::own_units::unit_of;
 use crate::rows::{reads_inputs_alone, reads_numbers_alone};
 use crate::units::{Dimension, Unit};
 use expression::constants::constants;

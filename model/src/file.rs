@@ -159,8 +159,8 @@ impl Parameter {
         if self.of_records_si.is_empty() {
             return self.values_si.first().copied();
         }
-        let own = self.of_records_si.iter().filter(|(name, _)| record.ends_with(name));
-        own.max_by_key(|(name, _)| Path::new(name).components().count()).map(|(_, value_si)| *value_si)
+        let of_record = self.of_records_si.iter().filter(|(name, _)| record.ends_with(name));
+        of_record.max_by_key(|(name, _)| Path::new(name).components().count()).map(|(_, value_si)| *value_si)
     }
 }
 

@@ -11,7 +11,7 @@
 //! | `rows` | which rows count, and over what a model is judged |
 //! | `library` | ready suspects in variables of their own |
 //! | `names` | what names mean |
-//! | `check`, `own_units` | names, numbers of arguments, dimensions; these in units of the file |
+//! | `check`, `file_units` | names, numbers of arguments, dimensions; these in units of the file |
 //! | `compile` | suspects in their places, bytecode |
 //! | `simulate`, `failure` | integration with sensitivities; why it ends |
 //!
@@ -27,9 +27,9 @@ mod check;
 mod compile;
 mod failure;
 mod file;
+mod file_units;
 mod library;
 mod names;
-mod own_units;
 mod read;
 mod rows;
 mod simulate;

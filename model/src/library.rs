@@ -212,7 +212,7 @@ impl Entry {
     }
 
     /// Whether it has a number, a state, a memory or a friction of this name.
-    pub(crate) fn has_own(&self, name: &str) -> bool {
+    pub(crate) fn defines(&self, name: &str) -> bool {
         self.has_parameter(name)
             || self.states.iter().any(|state| state.name == name)
             || self.memories.iter().any(|memory| memory.name == name)

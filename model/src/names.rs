@@ -29,11 +29,11 @@ pub(crate) enum Symbol {
 
 /// Before a name that the suspect of a library gives to a number, state or memory of its own: no text has it, so that it means
 /// nothing else even where the model has a name that reads the same.
-const OWN: char = '#';
+const SUSPECT_MARK: char = '#';
 
 /// Such a name.
-pub(crate) fn own_name(name: &str) -> String {
-    format!("{OWN}{name}")
+pub(crate) fn marked_name(name: &str) -> String {
+    format!("{SUSPECT_MARK}{name}")
 }
 
 pub(crate) fn name_of(model: &Model, symbol: Symbol) -> &str {
@@ -85,9 +85,9 @@ pub(crate) fn resolve(
         "pi" => return Ok(Symbol::Pi),
         _ => {}
     }
-    if let Some(name) = name.strip_prefix(OWN) {
-        let mut own = named_parts(model).filter(|(_, _, of)| of.is_some() && *of == suspect);
-        let found = own.find(|(_, other, _)| *other == name).map(|(symbol, ..)| symbol);
+    if let Some(name) = name.strip_prefix(SUSPECT_MARK) {
+        let mut parts = named_parts(model).filter(|(_, _, of)| of.is_some() && *of == suspect);
+        let found = parts.find(|(_, other, _)| *other == name).map(|(symbol, ..)| symbol);
         return found.ok_or_else(|| ExpressionError::new(at, format!("'{name}' is unknown")));
     }
     let owner = suspect.and_then(|index| model.suspects.get(index));

@@ -44,8 +44,10 @@ fn a_suspect_of_a_library_is_bound_to_names_of_the_model() {
     assert_eq!(stribeck.expression.text, "excess*sign(speed - 1[mm/s])*exp(-abs(speed - 1[mm/s])/velocity)");
     assert_eq!(viscous.expression.text, "-viscous/4[N s/m]*(viscous*speed)");
     let of = |suspect: usize| {
-        let own = model.parameters.iter().filter(move |one| one.suspect == Some(suspect));
-        own.map(|one| (one.name.as_str(), one.unit.text.as_str(), one.values_si[0])).collect::<Vec<_>>()
+        let parameters = model.parameters.iter().filter(move |one| one.suspect == Some(suspect));
+        parameters
+            .map(|one| (one.name.as_str(), one.unit.text.as_str(), one.values_si[0]))
+            .collect::<Vec<_>>()
     };
     assert_eq!(of(0), [("excess", "N", 5.0), ("velocity", "mm/s", 0.002)]);
     assert_eq!(of(1), [("viscous", "N s/mm", 3000.0)]);

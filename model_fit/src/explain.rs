@@ -286,8 +286,8 @@ pub(super) fn rows(rows: &Rows) -> Vec<String> {
 }
 
 fn parameters(model: &Model, of: Option<usize>) -> impl Iterator<Item = String> {
-    let own = model.parameters.iter().filter(move |one| one.suspect == of);
-    own.map(|one| format!("{} = {}", one.name, value_of(one)))
+    let parameters = model.parameters.iter().filter(move |one| one.suspect == of);
+    parameters.map(|one| format!("{} = {}", one.name, value_of(one)))
 }
 
 /// What is known of a number: value and unit, and whether it is fitted.

@@ -28,7 +28,7 @@ pub(super) fn steps(
     fitting: &Fitting<'_>,
     point: &Point,
 ) -> Vec<DVector<f64>> {
-    let is_own: Vec<bool> =
+    let is_of_record: Vec<bool> =
         fitting.unknowns.iter().map(|unknown| !matches!(unknown.id, UnknownId::Shared(_))).collect();
     let without = |block: &Vec<Normal>| {
         let mut rest = all.clone();
@@ -37,9 +37,15 @@ pub(super) fn steps(
             rest.matrix -= &normal.matrix * weight;
             rest.slope -= &normal.slope * weight;
         }
-        let shared = within(&rest, fitting, point, &vec![true; is_own.len()], &DVector::zeros(is_own.len()));
-        let shared = shared.map_with_location(|place, _, step| if is_own[place] { 0.0 } else { step });
-        within(all, fitting, point, &is_own, &shared)
+        let shared = within(
+            &rest,
+            fitting,
+            point,
+            &vec![true; is_of_record.len()],
+            &DVector::zeros(is_of_record.len()),
+        );
+        let shared = shared.map_with_location(|place, _, step| if is_of_record[place] { 0.0 } else { step });
+        within(all, fitting, point, &is_of_record, &shared)
     };
     normals[..normals.len() - 1].iter().map(without).collect()
 }

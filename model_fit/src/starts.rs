@@ -27,8 +27,8 @@ use nalgebra::DVector;
 /// Most starts that values of the file make.
 const MOST: usize = 12;
 /// Rows over the points of a suspect's own numbers, and the fewest and most of these: a fit takes some seconds on any record.
-const OWN_ROWS: usize = 14_400;
-const OWN: [usize; 2] = [4, 24];
+const ROWS_TIMES_POINTS: usize = 14_400;
+const POINTS: [usize; 2] = [4, 24];
 /// Of a suspect's values and points those that are fitted beside the first, and the cosine of what two do that are one start.
 const PROMISING: usize = 6;
 const SAME_DIRECTION: f64 = 0.999;
@@ -185,7 +185,8 @@ fn places_of(fitting: &Fitting<'_>, suspect: usize) -> Vec<usize> {
 fn over_ranges(fitting: &Fitting<'_>, suspect: usize, first: &[f64]) -> Vec<Vec<f64>> {
     let places = places_of(fitting, suspect);
     let rows: usize = fitting.records.iter().map(|record| record.time_s.len()).sum();
-    let points = if places.is_empty() { 0 } else { (OWN_ROWS / rows.max(1)).clamp(OWN[0], OWN[1]) };
+    let points =
+        if places.is_empty() { 0 } else { (ROWS_TIMES_POINTS / rows.max(1)).clamp(POINTS[0], POINTS[1]) };
     let point = |number: usize| {
         let mut values = first.to_vec();
         for (dimension, place) in places.iter().enumerate().take(PRIMES.len()) {

@@ -129,8 +129,8 @@ impl TermSeries {
         let records: Vec<MeasuredRecord> = fitted.fitting.records.iter().map(with_extra_output).collect();
         let program = Program::new(&measuring, &fitted.suspects).ok()?.along_states(&measuring);
         let fitting = Fitting::new(&measuring, program, &records, &fitted.suspects);
-        let is_own = |place: &usize| fitting.suspect_of(&fitting.unknowns[*place]) == Some(suspect);
-        let places: Vec<usize> = (0..fitting.unknowns.len()).filter(is_own).collect();
+        let is_of_suspect = |place: &usize| fitting.suspect_of(&fitting.unknowns[*place]) == Some(suspect);
+        let places: Vec<usize> = (0..fitting.unknowns.len()).filter(is_of_suspect).collect();
         let term = measuring.outputs.len() - 1;
         let (mut values, mut slopes) = (Vec::new(), Vec::new());
         for record in 0..records.len() {

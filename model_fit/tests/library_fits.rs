@@ -118,8 +118,8 @@ impl<'a> Plant<'a> {
     /// The same with what is hidden.
     fn hidden(mut self) -> Result<Self, String> {
         let listed = self.entry.parameters.iter().map(|parameter| {
-            let own = parameter.values_si.get(parameter.values_si.len() / 2);
-            match own.map(|value| value / parameter.quantity.unit.factor) {
+            let middle_si = parameter.values_si.get(parameter.values_si.len() / 2);
+            match middle_si.map(|value| value / parameter.quantity.unit.factor) {
                 Some(_) if parameter.is_fixed => None,
                 Some(value) => Some(1.2 * value),
                 None => Some(NEEDED[0]),

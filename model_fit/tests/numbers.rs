@@ -136,21 +136,21 @@ const CHANGES: [[&str; 3]; 6] = [
 fn the_report_of_another_version_of_a_file_extends_none() {
     let folder = tempfile::tempdir().unwrap();
     let more = "[tables.bump]\nx = [0, 1]\ny = [0, 2]\n[held_out]\nstart_samples = 3\n";
-    let own = LINE.to_owned() + more;
-    let report = closed(folder.path(), &own, &record(0.5, |u| 1.5 * u + u * u), None).report;
+    let model_file = LINE.to_owned() + more;
+    let report = closed(folder.path(), &model_file, &record(0.5, |u| 1.5 * u + u * u), None).report;
     let mut reported = serde_json::to_value(&report).unwrap();
     let is_of = |reported: &Value, text: &str| is_of(reported, folder.path(), text);
-    assert_eq!(is_of(&reported, &own), Ok(()));
-    assert_eq!(is_of(&reported, &format!("# A comment.\n{own}")), Ok(()));
+    assert_eq!(is_of(&reported, &model_file), Ok(()));
+    assert_eq!(is_of(&reported, &format!("# A comment.\n{model_file}")), Ok(()));
     for [from, to, line] in CHANGES {
-        assert!(own.contains(from), "{from}\n{own}");
-        let refused = is_of(&reported, &own.replacen(from, to, 1)).unwrap_err();
+        assert!(model_file.contains(from), "{from}\n{model_file}");
+        let refused = is_of(&reported, &model_file.replacen(from, to, 1)).unwrap_err();
         let message = format!(
             "the model file was changed since its report: one of both has no '{line}'; close it again"
         );
         assert_eq!(refused, message, "{from} to {to}");
     }
     reported["schema_version"] = 2.into();
-    let refused = is_of(&reported, &own).unwrap_err();
+    let refused = is_of(&reported, &model_file).unwrap_err();
     assert_eq!(refused, "the report has schema version 2; this program reads 1");
 }

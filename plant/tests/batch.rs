@@ -115,9 +115,9 @@ fn a_batch_follows_what_was_recorded() {
 fn a_rig_does_not_feel_its_neighbours() {
     let rig = RigParameters::baseline();
     let scenario = scenario::record(&rig, Kind { full_speed: true, ..Kind::FREE }, 1500);
-    let own = Plant::in_state(&rig, &scenario.states[0]).expect("recorded");
+    let watched = Plant::in_state(&rig, &scenario.states[0]).expect("recorded");
     // Beside a rig that rests and others that nothing but numbers can be.
-    let mut broken = *own.state();
+    let mut broken = *watched.state();
     broken.axes[0].rod_velocity_m_per_s = 900.0;
     broken.axes[1].stored_air_a_j = 1e4;
     let broken = Plant::in_state(&rig, &broken).expect("odd, but allowed");
@@ -125,7 +125,7 @@ fn a_rig_does_not_feel_its_neighbours() {
     for place in 0..8 {
         let mut plants = vec![broken.clone(); 8];
         plants[(place + 3) % 8] = resting.clone();
-        plants[place] = own.clone();
+        plants[place] = watched.clone();
         let mut batch = Batch::new(plants);
         scenario.inputs[..1000].iter().for_each(|inputs| batch.step_alike(inputs));
         assert_eq!(bits(batch.plants()[place].state()), bits(&scenario.states[1000]), "in lane {place}");

@@ -101,8 +101,9 @@ fn a_force_is_a_table_of_the_same_law_and_a_flow_one_of_the_same_mass() {
 
 #[test]
 fn a_table_of_the_term_or_of_the_file_is_the_same_curve_in_a_table_of_the_rig() {
-    let own = "tables.lift = { x_unit = \"mm\", y_unit = \"N\", x = [0, 100, 500], y = [0, 20, -7.5] }";
-    let rig = with(&[("load.force", "2*lift(x)", own)]);
+    let term_table =
+        "tables.lift = { x_unit = \"mm\", y_unit = \"N\", x = [0, 100, 500], y = [0, 20, -7.5] }";
+    let rig = with(&[("load.force", "2*lift(x)", term_table)]);
     let at = vec![0.0, 0.1, 0.5];
     let (axis, balance, variable) = (Axis::Load, Balance::Force, Variable::Extension);
     let tabulated = Tabulated { axis, balance, variable, at, value: vec![0.0, 40.0, -15.0] };
@@ -111,9 +112,9 @@ fn a_table_of_the_term_or_of_the_file_is_the_same_curve_in_a_table_of_the_rig() 
     // Under the file's tables; a term's own comes first, and one that nothing reads is not the term's.
     let of_file = "[tables.lift]\nx_unit = \"mm\"\ny_unit = \"kN\"\nx = [0, 100, 500]\ny = [0, 0.02, -0.0075]\n\
                    [tables.other]\nx = [0, 1]\ny = [0.1, 1e-7]\n";
-    let both = text(&[("load.force", "lift(x)", ""), ("drive.force", "lift(x)", own)]);
+    let both = text(&[("load.force", "lift(x)", ""), ("drive.force", "lift(x)", term_table)]);
     let both = read(&format!("{both}{of_file}"));
-    alike(&both, &with(&[("load.force", "lift(x)", own), ("drive.force", "lift(x)", own)]));
+    alike(&both, &with(&[("load.force", "lift(x)", term_table), ("drive.force", "lift(x)", term_table)]));
     let again: String = both.terms().iter().map(|term| term.toml("terms")).collect();
     assert!(!again.contains("other") && again.contains("y_unit = \"kN\""), "{again}");
     assert_eq!(written_again(both.terms()), both);
@@ -193,11 +194,11 @@ fn a_flow_and_what_is_kept_may_follow_the_force_sensor() {
 /// As files did before F was known in forces.
 #[test]
 fn a_number_of_a_force_may_be_called_as_the_force_sensor() {
-    let own = |name: &str| {
+    let with_number = |name: &str| {
         let number = format!("parameters.{name} = {{ unit = \"N\", value = 7 }}");
         with(&[("drive.force", &format!("-{name}*tanh(v/1[mm/s])"), &number)])
     };
-    alike(&own("F"), &own("G"));
+    alike(&with_number("F"), &with_number("G"));
 }
 
 #[test]

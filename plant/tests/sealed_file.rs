@@ -28,11 +28,11 @@ fn a_file_says_what_a_rig_file_says() {
 
 #[test]
 fn effects_of_both_files_act_and_at_one_place_the_sealed_one_counts() {
-    let own = rig()
+    let unsealed = rig()
         .with_effect("piston-leakage", "drive", &[("leakage_nl_per_min", 9.0)])
         .and_then(|rig| rig.with_effect("inclination", "load", &[("force_n", 5.0)]))
         .expect("good");
-    let both = own.with_effects_of(ONE, "sealed.toml").expect("good");
+    let both = unsealed.with_effects_of(ONE, "sealed.toml").expect("good");
     let found: Vec<(&str, f64)> =
         both.effects().iter().map(|effect| (effect.name, effect.numbers[0])).collect();
     assert_eq!(found, [("piston-leakage", 2.5), ("inclination", 5.0)]);

@@ -41,10 +41,10 @@ fn the_values_stand_under_their_names() {
         assert_eq!(value(&truth, &format!("{name}_spool")), state.spool);
         assert_eq!(value(&truth, &format!("{name}_stored_air_b_J")), state.stored_air_b_j);
         assert_eq!(value(&truth, &format!("{name}_flow_a_m3_per_s")), state.flow_a_m3_per_s);
-        let own = truth.axes[axis.index()];
-        assert_eq!(value(&truth, &format!("{name}_pressure_b_Pa")), own.pressure_b_pa);
-        assert_eq!(value(&truth, &format!("{name}_edge_flow_b_m3_per_s")), own.edge_flow_b_m3_per_s);
-        assert_eq!(value(&truth, &format!("{name}_sensor_force_N")), own.sensor_force_n);
+        let axis_truth = truth.axes[axis.index()];
+        assert_eq!(value(&truth, &format!("{name}_pressure_b_Pa")), axis_truth.pressure_b_pa);
+        assert_eq!(value(&truth, &format!("{name}_edge_flow_b_m3_per_s")), axis_truth.edge_flow_b_m3_per_s);
+        assert_eq!(value(&truth, &format!("{name}_sensor_force_N")), axis_truth.sensor_force_n);
     }
     assert_eq!(value(&truth, "supply_pressure_Pa"), 7e5);
     assert_eq!(value(&truth, "check_valves_shut"), 0.0);

@@ -50,10 +50,13 @@ impl TrialRunner {
     /// [`RefusalReason::NoTrialRunner`] with the places that were looked at.
     pub fn find() -> Result<Self, RefusalReason> {
         const NAME: &str = "controller";
-        let own = env::current_exe().map_err(RefusalReason::NoChild)?;
-        let around = own.ancestors().skip(1).take(2).map(|folder| folder.join(NAME));
-        let places: Vec<_> =
-            if own.file_name().is_some_and(|name| name == NAME) { vec![own] } else { around.collect() };
+        let executable = env::current_exe().map_err(RefusalReason::NoChild)?;
+        let around = executable.ancestors().skip(1).take(2).map(|folder| folder.join(NAME));
+        let places: Vec<_> = if executable.file_name().is_some_and(|name| name == NAME) {
+            vec![executable]
+        } else {
+            around.collect()
+        };
         let found = places.iter().find(|place| place.is_file()).cloned();
         let program = found.ok_or_else(|| {
             RefusalReason::NoTrialRunner(

@@ -134,12 +134,13 @@ pub fn response(streams: &[Stream], place: usize, line: &Line) -> Option<Respons
         return None;
     }
     let busy_period_ns = level.busy_period_ns()?;
-    let instances = level.own.arrivals.most_in(busy_period_ns);
+    let instances = level.stream.arrivals.most_in(busy_period_ns);
     let mut worst = (0, 0);
     let mut waited_ns = level.blocking_ns;
     for number in 0..instances {
         waited_ns = level.waiting_ns(number, waited_ns)?;
-        let response_ns = waited_ns + level.own.transmission_ns - level.own.arrivals.earliest_ns(number);
+        let response_ns =
+            waited_ns + level.stream.transmission_ns - level.stream.arrivals.earliest_ns(number);
         if response_ns > worst.0 {
             worst = (response_ns, number);
         }
@@ -151,7 +152,7 @@ pub fn response(streams: &[Stream], place: usize, line: &Line) -> Option<Respons
 /// One priority, and what is above and below it.
 struct Level<'a> {
     above: &'a [Stream],
-    own: &'a Stream,
+    stream: &'a Stream,
     line: &'a Line,
     blocking_ns: u64,
     error_ns: u64,
@@ -164,7 +165,7 @@ impl<'a> Level<'a> {
             |streams: &[Stream]| streams.iter().map(|stream| stream.transmission_ns).max().unwrap_or(0);
         let error_ns =
             u64::from(crate::wire_time::WORST_ERROR_BITS) * line.bit_ns + longest(&streams[..=place]);
-        Self { above, own: &rest[0], line, blocking_ns: longest(&rest[1..]), error_ns }
+        Self { above, stream: &rest[0], line, blocking_ns: longest(&rest[1..]), error_ns }
     }
 
     fn errors_ns(&self, time_ns: u64) -> u64 {
@@ -176,18 +177,18 @@ impl<'a> Level<'a> {
     }
 
     fn busy_period_ns(&self) -> Option<u64> {
-        fixed_point(self.own.transmission_ns, |time_ns| {
-            let own = self.own.arrivals.most_in(time_ns) * self.own.transmission_ns;
-            self.blocking_ns + self.errors_ns(time_ns) + own + self.interference_ns(time_ns)
+        fixed_point(self.stream.transmission_ns, |time_ns| {
+            let instances_ns = self.stream.arrivals.most_in(time_ns) * self.stream.transmission_ns;
+            self.blocking_ns + self.errors_ns(time_ns) + instances_ns + self.interference_ns(time_ns)
         })
     }
 
     /// Longest time until instance `number` begins, looked for from `from_ns` on.
     fn waiting_ns(&self, number: u64, from_ns: u64) -> Option<u64> {
-        let before = self.blocking_ns + number * self.own.transmission_ns;
+        let before = self.blocking_ns + number * self.stream.transmission_ns;
         fixed_point(from_ns.max(before), |waited_ns| {
             before
-                + self.errors_ns(waited_ns + self.own.transmission_ns)
+                + self.errors_ns(waited_ns + self.stream.transmission_ns)
                 + self.interference_ns(waited_ns + self.line.bit_ns)
         })
     }

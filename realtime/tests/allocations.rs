@@ -99,14 +99,14 @@ fn a_loop_of_thousands_of_cycles_allocates_nothing_for_any_wobble() {
     let config =
         PeriodicConfig { period, policy: OverrunPolicy::CatchUp, spin: Some(Duration::from_micros(100)) };
     let mut periodic = PeriodicLoop::new(&clock, config, clock.now() + period);
-    let mut own = Recorder::new();
+    let mut recorder = Recorder::new();
 
     let watching = watch();
     for _ in 0..5000 {
         let cycle = periodic.next_cycle().expect("catches up");
         clock.advance(Duration::from_micros(300));
-        own.record(cycle.wakeup_latency().as_nanos() as u64);
-        own.record(u64::MAX);
+        recorder.record(cycle.wakeup_latency().as_nanos() as u64);
+        recorder.record(u64::MAX);
         periodic.end_of_work();
     }
     clock.step_forward(Duration::from_secs(3600));

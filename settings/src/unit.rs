@@ -40,8 +40,8 @@ pub fn without_unit(name: &str) -> &str {
 /// Quantity and unit of a name that has a unit.
 fn split(name: &str) -> Option<(&str, &'static str)> {
     UNITS.iter().find_map(|(end, unit)| {
-        let (quantity, own) = name.split_at_checked(name.len().checked_sub(end.len())?)?;
-        own.eq_ignore_ascii_case(end).then_some((quantity, *unit))
+        let (quantity, tail) = name.split_at_checked(name.len().checked_sub(end.len())?)?;
+        tail.eq_ignore_ascii_case(end).then_some((quantity, *unit))
     })
 }
 

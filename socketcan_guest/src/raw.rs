@@ -71,7 +71,7 @@ impl RawOptions {
         self.is_on(LOOPBACK)
     }
 
-    pub(crate) fn receives_own(&self) -> bool {
+    pub(crate) fn receives_what_it_sends(&self) -> bool {
         self.is_on(RECEIVE_OWN)
     }
 

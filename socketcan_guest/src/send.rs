@@ -209,22 +209,22 @@ impl Supervisor {
         let (id, stamp_ns, now) = (identifier(frame), wall_clock_ns(), Instant::now());
         let (mut wanted, mut transported) = (Vec::new(), Vec::new());
         for (inode, socket) in self.sockets.iter_mut().filter(|(_, socket)| socket.listens_on(interface)) {
-            let is_own = from == FrameOrigin::Guest(*inode);
+            let sent_here = from == FrameOrigin::Guest(*inode);
             let mut actions = Vec::new();
             match &mut socket.kind {
                 Kind::Raw(raw) => {
-                    if !raw.passes(id) || is_own && !raw.receives_own() {
+                    if !raw.passes(id) || sent_here && !raw.receives_what_it_sends() {
                         continue;
                     }
                     let local = if from == FrameOrigin::Bus { 0 } else { libc::MSG_DONTROUTE };
-                    let flags = (local | if is_own { libc::MSG_CONFIRM } else { 0 }) as u32;
+                    let flags = (local | if sent_here { libc::MSG_CONFIRM } else { 0 }) as u32;
                     socket.deliver(
                         frame,
                         MessageMetadata { interface, flags, dropped: 0, stamp_ns, error: None },
                     );
                 }
                 Kind::Bcm(manager) => manager.take_frame(interface, frame, now, &mut actions),
-                Kind::Transport(_) if is_own => {}
+                Kind::Transport(_) if sent_here => {}
                 Kind::Transport(transport) => {
                     let mut events = Vec::new();
                     let was_sending = transport.protocol.is_sending();

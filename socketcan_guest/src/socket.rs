@@ -238,7 +238,7 @@ impl GuestSocket {
 
     /// Whether it is bound to this interface or to any.
     pub(crate) fn listens_on(&self, interface: u32) -> bool {
-        self.interface.is_some_and(|own| own == 0 || own == interface)
+        self.interface.is_some_and(|bound| bound == 0 || bound == interface)
     }
 }
 

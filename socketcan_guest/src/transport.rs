@@ -170,13 +170,12 @@ impl Supervisor {
     }
 
     fn others_of_channel(&self, inode: u64) -> impl Iterator<Item = (u64, &GuestSocket, &Transport)> {
-        let channel =
+        let channel_of =
             |socket: &GuestSocket| Some((socket.interface?, socket.transport()?.protocol.identifiers?));
-        let own = self.sockets.get(&inode).and_then(channel);
-        let others = self
-            .sockets
-            .iter()
-            .filter(move |(other, socket)| **other != inode && own.is_some() && channel(socket) == own);
+        let channel = self.sockets.get(&inode).and_then(channel_of);
+        let others = self.sockets.iter().filter(move |(other, socket)| {
+            **other != inode && channel.is_some() && channel_of(socket) == channel
+        });
         others.filter_map(|(inode, socket)| Some((*inode, socket, socket.transport()?)))
     }
 

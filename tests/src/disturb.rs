@@ -5,8 +5,8 @@
 //! of the run's folder alone; `bench cause` sees the report alone.
 
 use crate::binaries::Program;
+use crate::c_algorithm;
 use crate::launch::Pace;
-use crate::own;
 use crate::process::Running;
 use crate::records;
 use crate::scene::{RESTLESS, Scene};
@@ -85,8 +85,8 @@ pub struct NamedCause {
 pub fn run(disturbance: Disturbance, after: Duration) -> NamedCause {
     let scene = Scene::new(RESTLESS);
     if disturbance == Disturbance::PageFaults {
-        own::build_strictly(&scene, "tests/c/page_faults.c");
-        scene.write("program.toml", own::PROGRAM);
+        c_algorithm::build_strictly(&scene, "tests/c/page_faults.c");
+        scene.write("program.toml", c_algorithm::PROGRAM);
     }
     let out = scene.path("run");
     let wire = if disturbance == Disturbance::FrameLoss { "?loss=0.01&seed=1" } else { "" };

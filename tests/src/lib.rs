@@ -16,7 +16,7 @@
 //!   discrepancy  the workflow as a program
 //!   hidden ── effects: each, drawn, all at the ends of their ranges
 //!   firmware  a controller in C, for Linux and as an ELF, and how well it positions
-//!   own ───── algorithms in C, built as a user builds them
+//!   c_algorithm  algorithms in C, built as a user builds them
 //!   disturb ─ disturbances whose cause a report has to name
 //!   noise ── a babbling node, and whether any of its commands acted
 //!   pairs ─── runs with something and without, in turns, and the table of what it costs
@@ -35,6 +35,7 @@ mod axis_table;
 mod binaries;
 pub mod broken;
 pub mod bus_cycles;
+pub mod c_algorithm;
 pub mod discrepancy;
 pub mod disturb;
 pub mod events;
@@ -48,7 +49,6 @@ mod launch;
 pub mod load;
 pub mod noise;
 pub mod onlooker;
-pub mod own;
 pub mod pairs;
 mod peer;
 mod process;

@@ -312,8 +312,9 @@ fn worker_at_work(driver: u32) -> rustix::process::Pid {
             Some((number.parse::<u32>().ok()?, name.to_owned(), parent))
         });
         let processes: Vec<_> = processes.collect();
-        let parent =
-            |number: u32| processes.iter().find(|(own, ..)| *own == number).map(|(_, _, parent)| *parent);
+        let parent = |number: u32| {
+            processes.iter().find(|(process, ..)| *process == number).map(|(_, _, parent)| *parent)
+        };
         let below = |mut number: u32| loop {
             match parent(number) {
                 Some(parent) if parent == driver => break true,

@@ -49,7 +49,7 @@ fn on(step: &str, record: &Path, out: &Path, more: &[&str]) -> CompletedProcess 
     let rig = rig();
     let mut all: Vec<&dyn AsRef<OsStr>> = vec![&step, &"--rig", &rig, &"--train", &record];
     all.extend([&"--out" as &dyn AsRef<OsStr>, &out]);
-    all.extend(more.iter().map(|own| own as &dyn AsRef<OsStr>));
+    all.extend(more.iter().map(|argument| argument as &dyn AsRef<OsStr>));
     discrepancy(&all)
 }
 
@@ -83,18 +83,18 @@ fn turn_force(cells: &[&str]) -> String {
 
 fn effects(report: &Value, list: &str) -> Vec<String> {
     let all = report[list].as_array().unwrap_or_else(|| panic!("no {list}"));
-    all.iter().map(|own| own["effect"].as_str().expect("a name").to_owned()).collect()
+    all.iter().map(|effect| effect["effect"].as_str().expect("a name").to_owned()).collect()
 }
 
 #[test]
 fn a_hidden_effect_is_named_in_the_same_bytes_whatever_the_threads_and_the_held_out_record_changes_gap_alone()
 {
-    let own = &*RECORDS;
+    let records = &*RECORDS;
     let folder = tempfile::tempdir().expect("a folder");
     let out = |name: &str| folder.path().join(name);
-    let test = own.test.to_str().expect("a path in ASCII");
-    let one = on("close", &own.train, &out("one"), &["--threads", "1", "--test", test]).expect_code(GOOD);
-    on("close", &own.train, &out("two"), &["--threads", "2", "--test", test]).expect_code(GOOD);
+    let test = records.test.to_str().expect("a path in ASCII");
+    let one = on("close", &records.train, &out("one"), &["--threads", "1", "--test", test]).expect_code(GOOD);
+    on("close", &records.train, &out("two"), &["--threads", "2", "--test", test]).expect_code(GOOD);
     for file in ["report.json", "report.html", "rig.toml"] {
         let [one, two] =
             ["one", "two"].map(|name| fs::read(out(name).join(file)).expect("a file of a close"));
@@ -111,7 +111,7 @@ fn a_hidden_effect_is_named_in_the_same_bytes_whatever_the_threads_and_the_held_
     assert!((value - FORCE_N).abs() < (4.0 * error).max(0.1 * FORCE_N), "{reported}");
 
     // `name` is a close without a held-out record.
-    on("name", &own.train, &out("name"), &["--threads", "2"]).expect_code(GOOD);
+    on("name", &records.train, &out("name"), &["--threads", "2"]).expect_code(GOOD);
     let without = json(&out("name/report.json"));
     the_held_out_record_changes_two_fields_alone(&out("one"), &out("name"));
     assert!(
@@ -239,11 +239,12 @@ fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
     let checks = json(&folder.path().join("checks.json"));
     let findings = &checks[0]["findings"];
     for kind in ["lost-samples", "gap"] {
-        let own = find(findings, "kind", kind);
-        assert!(own["line"].is_u64() && own["fatal"] == false, "{own}");
+        let finding = find(findings, "kind", kind);
+        assert!(finding["line"].is_u64() && finding["fatal"] == false, "{finding}");
     }
-    let saturated = findings.as_array().expect("findings").iter().any(|own| {
-        (own["kind"] == "clipped" || own["kind"] == "stuck") && own["column"] == "drive_pressure_a_Pa"
+    let saturated = findings.as_array().expect("findings").iter().any(|finding| {
+        (finding["kind"] == "clipped" || finding["kind"] == "stuck")
+            && finding["column"] == "drive_pressure_a_Pa"
     });
     assert!(saturated, "{}", check.stdout);
 
@@ -277,9 +278,9 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
         let report = json(&folder.path().join("report.json"));
         assert_eq!(report["verdict"], "bad-data");
         assert!(effects(&report, "named").is_empty());
-        let own = find(&report["checks"][0]["findings"], "kind", kind);
-        assert_eq!(own["fatal"], true);
-        let line = own["line"].as_u64().unwrap_or_else(|| panic!("no line in {own}"));
+        let finding = find(&report["checks"][0]["findings"], "kind", kind);
+        assert_eq!(finding["fatal"], true);
+        let line = finding["line"].as_u64().unwrap_or_else(|| panic!("no line in {finding}"));
         ended.expect_stdout(&[reported, &format!("{}:{line}: ", record.display())]);
         assert!(folder.path().join("report.html").exists());
         assert!(!folder.path().join("rig.toml").exists(), "a model out of a record that cannot be used");
@@ -292,17 +293,17 @@ fn columns_that_mean_something_else_make_the_verdict_bad_data() {
 #[test]
 fn what_is_read_is_never_written_over_and_no_record_is_both_trained_on_and_held_out() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (train, own) = (&RECORDS.train, folder.path().join("rig.toml"));
-    fs::copy(rig(), &own).expect("a folder that can be written");
+    let (train, rig_file) = (&RECORDS.train, folder.path().join("rig.toml"));
+    fs::copy(rig(), &rig_file).expect("a folder that can be written");
     let close = |more: &[&dyn AsRef<OsStr>]| {
         let out = folder.path();
         let mut all: Vec<&dyn AsRef<OsStr>> =
-            vec![&"close", &"--rig", &own, &"--out", &out, &"--train", train];
+            vec![&"close", &"--rig", &rig_file, &"--out", &out, &"--train", train];
         all.extend(more);
         discrepancy(&all).expect_code(BAD_INPUT)
     };
     close(&[]).expect_stderr(&["rig.toml", "would be written over", "another --out"]);
-    assert_eq!(fs::read(&own).expect("the rig file"), fs::read(rig()).expect("the rig file"));
+    assert_eq!(fs::read(&rig_file).expect("the rig file"), fs::read(rig()).expect("the rig file"));
     close(&[&train]).expect_stderr(&["--train", "given twice"]);
     close(&[&"--test", &train]).expect_stderr(&["--test", "a training record as well"]);
     assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 1, "only the rig file");

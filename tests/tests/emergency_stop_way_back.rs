@@ -8,7 +8,7 @@ use rustix::process::Signal;
 use serde_json::Value;
 use system_tests::bus_cycles::by_cycle;
 use system_tests::{
-    AxisTable, CompletedProcess, LINKED, Pace, Program, Scene, Table, bus_log, json, own, turn,
+    AxisTable, CompletedProcess, LINKED, Pace, Program, Scene, Table, bus_log, c_algorithm, json, turn,
 };
 
 /// 0.3 m in 0.5 s: 1.2 m/s at its fastest, which the valve gives for a moment only.
@@ -51,8 +51,8 @@ fn tripped(source: StopSource) -> Scene {
     let script = format!("[[rig.event]]\nat_s = {}\ndo = \"emergency-stop\"\n", TRIP as f64 * 1e-3);
     let scene = Scene::new(&if source == StopSource::Rig { format!("{FAST}{script}") } else { FAST.into() });
     if source == StopSource::Controller {
-        own::failing(&scene, "count > 200 && ready->set_position_m > 0.28", &[]);
-        scene.write("program.toml", own::PROGRAM);
+        c_algorithm::failing(&scene, "count > 200 && ready->set_position_m > 0.28", &[]);
+        scene.write("program.toml", c_algorithm::PROGRAM);
     }
     let ended = run(&scene, |cycle| (source == StopSource::Bus && cycle == TRIP).then(|| stop(false)));
     let cause =
@@ -202,8 +202,8 @@ const FAILS_ONCE: &str = "({ static int failed; const int now = !failed && count
 #[test]
 fn a_controllers_own_fault_is_released_by_the_console_and_the_repetition_begins_anew() {
     let scene = Scene::new(&FAST.replace("\"end\"", "\"restart\""));
-    own::failing(&scene, FAILS_ONCE, &[]);
-    scene.write("program.toml", own::PROGRAM);
+    c_algorithm::failing(&scene, FAILS_ONCE, &[]);
+    scene.write("program.toml", c_algorithm::PROGRAM);
     run(&scene, |cycle| (cycle == RELEASE).then(|| stop(true))).expect_code(0);
     let drive = AxisTable::read(&scene.path("run/controller-drive.csv"));
     let chain = ["ready", "tripped", "waiting-for-release", "recovering", "ready"];

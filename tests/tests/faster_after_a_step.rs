@@ -61,23 +61,25 @@ fn what_makes_the_rig_faster_after_a_step_is_named_from_that_step() {
     for (text, name, number) in cases {
         let Step { scene, changes } = step(&text);
         // Outwards: v and p_a rise.
-        for (own, plain) in changes.iter().zip(baseline).take(2) {
-            assert!(*own > plain && plain > 0.0, "{name}: {changes:?}, without it {baseline:?}");
+        for (change, plain) in changes.iter().zip(baseline).take(2) {
+            assert!(*change > plain && plain > 0.0, "{name}: {changes:?}, without it {baseline:?}");
         }
         let report = closed(&scene.path("emulator/measurement.csv"), &scene.path("closed"));
         let named = report["named"].as_array().expect("a list");
-        let own = match name.strip_prefix("parameter:") {
+        let estimate = match name.strip_prefix("parameter:") {
             Some(_) => {
                 assert!(named.is_empty(), "{name}: {}", report["summary"]);
                 let all = report["parameters"].as_array().expect("a list");
-                all.iter().find(|own| own["name"] == name).unwrap_or_else(|| panic!("{}", report["summary"]))
+                all.iter()
+                    .find(|parameter| parameter["name"] == name)
+                    .unwrap_or_else(|| panic!("{}", report["summary"]))
             }
             None => {
                 assert!(named.len() == 1 && named[0]["effect"] == name, "{name}: {}", report["summary"]);
                 &named[0]["parameters"][0]
             }
         };
-        let [value, error] = ["value", "standard_error"].map(|key| own[key].as_f64().expect("a number"));
+        let [value, error] = ["value", "standard_error"].map(|key| estimate[key].as_f64().expect("a number"));
         let more: [f64; 3] = std::array::from_fn(|at| changes[at] - baseline[at]);
         eprintln!("{name}: {more:?} m/s, Pa, Pa more than without; {value} +- {error}");
         assert!((value - number).abs() < 4.0 * error + 0.01 * number, "{name}: {value} +- {error}");

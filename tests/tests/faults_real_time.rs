@@ -37,7 +37,7 @@ fn the_same_script_breaks_the_same_in_real_time_and_in_lockstep() {
         assert!(stuck.iter().all(|pressure| pressure == &stuck[0]), "the sensor shows one value");
         let truth = scene.truth();
         let spool = &truth.column("load_spool")[600..=1400];
-        assert!(spool.iter().all(|own| own.to_bits() == spool[0].to_bits()), "the spool does not move");
+        assert!(spool.iter().all(|sample| sample.to_bits() == spool[0].to_bits()), "the spool does not move");
         let faults = &summary["bus_host"]["faults"];
         // In real time the host takes orders when its turn comes; how many frames that concerns is the machine's affair.
         for (name, id) in [("bus-loss", "153"), ("bus-delay", "140"), ("babbling-node", "010")] {

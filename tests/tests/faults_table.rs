@@ -351,7 +351,7 @@ fn mass_on_top_is_what_forces_have_to_move() {
     let faults =
         fault("added-mass", "drive", "mass_kg = 20.0") + &fault("added-mass", "load", "mass_kg = 3.0");
     let outcome = moving(&faults);
-    for (axis, own_kg, added_kg) in [("drive", 5.0, 20.0), ("load", 1.5, 3.0)] {
+    for (axis, axis_kg, added_kg) in [("drive", 5.0, 20.0), ("load", 1.5, 3.0)] {
         let column = |name: &str| outcome.truth.column(&format!("{axis}_{name}"));
         let forces =
             ["pneumatic", "hand", "contact", "viscous_friction", "sliding_friction", "holding", "effect"]
@@ -360,7 +360,7 @@ fn mass_on_top_is_what_forces_have_to_move() {
         let mut seen = 0;
         for k in (0..400).filter(|k| acceleration[*k].abs() > 0.01) {
             let mass_kg = forces.iter().map(|force| force[k]).sum::<f64>() / acceleration[k];
-            let expected_kg = own_kg + if (BEGINS..ENDS).contains(&k) { added_kg } else { 0.0 };
+            let expected_kg = axis_kg + if (BEGINS..ENDS).contains(&k) { added_kg } else { 0.0 };
             // Forces of a thousand newton that nearly cancel.
             assert!((mass_kg / expected_kg - 1.0).abs() < 1e-9, "{axis}, cycle {k}: {mass_kg} kg");
             seen += usize::from((BEGINS..ENDS).contains(&k));

@@ -31,9 +31,9 @@ fn simulate(scene: &Scene, fmu: &Path, inputs: &str, starts: &[&str]) -> (Table,
 }
 
 #[track_caller]
-fn expect_close(name: &str, cycle: usize, own: f64, expected: f64) {
+fn expect_close(name: &str, cycle: usize, output: f64, expected: f64) {
     let most = TOLERANCE * expected.abs().max(1.0);
-    assert!((own - expected).abs() <= most, "{name} in cycle {cycle}: {own} instead of {expected}");
+    assert!((output - expected).abs() <= most, "{name} in cycle {cycle}: {output} instead of {expected}");
 }
 
 #[test]
@@ -59,12 +59,13 @@ fn the_fmu_under_the_commands_of_a_rehearsal_gives_its_measurement_and_its_truth
             let (quantity, unit) = column.rsplit_once('_').expect("a unit");
             let name = format!("{axis}_{quantity}_measured_{unit}");
             let rows = outputs.column(&name).into_iter().zip(measured.column(&format!("{axis}_{column}")));
-            rows.enumerate().for_each(|(cycle, (own, expected))| expect_close(&name, cycle, own, expected));
+            rows.enumerate()
+                .for_each(|(cycle, (output, expected))| expect_close(&name, cycle, output, expected));
         }
     }
     for name in truth.names().iter().filter(|name| *name != "time_s") {
         let rows = outputs.column(name).into_iter().zip(truth.column(name));
-        rows.enumerate().for_each(|(cycle, (own, expected))| expect_close(name, cycle, own, expected));
+        rows.enumerate().for_each(|(cycle, (output, expected))| expect_close(name, cycle, output, expected));
     }
 }
 

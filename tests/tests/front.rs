@@ -20,9 +20,9 @@ impl Prefix {
         for folder in ["bin", "lib/airbench", "share/airbench", "work"] {
             fs::create_dir_all(prefix.path(folder)).expect("a folder of our own");
         }
-        let own = executable(Program::Airbench, Build::Shipped);
+        let airbench = executable(Program::Airbench, Build::Shipped);
         // A link would lead back into the checkout.
-        install(&fs::read(own).expect("our own program"), &prefix.path("bin/airbench"));
+        install(&fs::read(airbench).expect("our own program"), &prefix.path("bin/airbench"));
         let programs =
             [Program::Emulator, Program::Controller, Program::Bench, Program::Discrepancy, Program::Campaign];
         for program in programs {

@@ -73,7 +73,10 @@ fn a_csv_holds_the_signals_of_the_measurement_at_its_times() {
         for (cycle, value) in measured.column(column).into_iter().enumerate() {
             let row = first + cycle;
             assert!(close(times[row], cycle as f64 * 1e-3));
-            assert!(exported[signal][row].is_some_and(|own| close(own, value)), "{signal} in cycle {cycle}");
+            assert!(
+                exported[signal][row].is_some_and(|cell| close(cell, value)),
+                "{signal} in cycle {cycle}"
+            );
         }
     }
     // The command that acts in a cycle was on the bus in the one before.
@@ -124,10 +127,10 @@ fn asammdf_reads_the_same_values_units_and_times_from_the_mdf4() {
             table["time_s"].iter().zip(column).filter_map(|(time_s, value)| Some(((*time_s)?, (*value)?)));
         let expected: Vec<_> = rows.collect();
         assert_eq!(values.len(), expected.len(), "{name}");
-        for (own, (time_s, value)) in times.iter().zip(&values).zip(&expected) {
+        for (sample, (time_s, value)) in times.iter().zip(&values).zip(&expected) {
             assert!(
-                close(*own.0, *time_s) && own.1 == value,
-                "{name}: {own:?} instead of {value} at {time_s} s"
+                close(*sample.0, *time_s) && sample.1 == value,
+                "{name}: {sample:?} instead of {value} at {time_s} s"
             );
         }
     }

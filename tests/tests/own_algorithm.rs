@@ -2,12 +2,12 @@
 
 use protocol::frames::{EmergencyStopReason, Frame};
 use system_tests::bus_cycles::by_cycle;
-use system_tests::{CompletedProcess, Pace, SHORT, Scene, own, turn};
+use system_tests::{CompletedProcess, Pace, SHORT, Scene, c_algorithm, turn};
 
 /// A scene whose drive is controlled by the scene's own_algorithm.so.
 fn scene() -> Scene {
     let scene = Scene::new(SHORT);
-    scene.write("program.toml", own::PROGRAM);
+    scene.write("program.toml", c_algorithm::PROGRAM);
     scene
 }
 
@@ -22,10 +22,10 @@ fn run(scene: &Scene) -> CompletedProcess {
 #[test]
 fn the_example_in_c_drives_the_experiment() {
     let scene = scene();
-    own::build_strictly(&scene, "controller/examples-c/position_pi.c");
+    c_algorithm::build_strictly(&scene, "controller/examples-c/position_pi.c");
     // A slow integral and a wide dead zone: with the defaults it hunts about the friction and never comes to rest.
     let tuned = "integral_time_s = 2.0\ndead_zone_m = 0.001\n";
-    scene.write("program.toml", &format!("{}{tuned}", own::PROGRAM));
+    scene.write("program.toml", &format!("{}{tuned}", c_algorithm::PROGRAM));
     run(&scene).expect_code(0);
     let drive = &scene.report()["axes"]["drive"];
     assert_eq!(drive["chain_state"], "done");
@@ -42,7 +42,7 @@ fn the_example_in_c_drives_the_experiment() {
 fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the_emergency_stop() {
     // While the carriage moves: its set-point is a quarter of a second long above this speed.
     let scene = scene();
-    own::failing(&scene, "count > 200 && ready->set_velocity_m_per_s > 0.1", &[]);
+    c_algorithm::failing(&scene, "count > 200 && ready->set_velocity_m_per_s > 0.1", &[]);
     let ended = run(&scene).expect_code(1);
     ended.expect_stderr(&["stopped before the end: drive: controller-fault", "returned NaN or infinity"]);
     let table = scene.axis_table("drive");
@@ -71,7 +71,7 @@ fn a_library_that_returns_no_number_is_latched_with_the_valve_shut_and_trips_the
 #[test]
 fn an_infinite_result_during_the_approach_is_latched_too() {
     let scene = scene();
-    own::failing(&scene, "count == 300", &["-DRESULT=INFINITY"]);
+    c_algorithm::failing(&scene, "count == 300", &["-DRESULT=INFINITY"]);
     run(&scene).expect_code(1).expect_stderr(&["drive: controller-fault"]);
     let table = scene.axis_table("drive");
     let fault = table.first("main_chain", "fault", 0);
@@ -84,7 +84,7 @@ fn an_infinite_result_during_the_approach_is_latched_too() {
 fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
     let scene = scene();
     let slow = "count > 150 && (usleep(2000), 0)";
-    own::failing(&scene, slow, &["-D_DEFAULT_SOURCE", "-include", "unistd.h"]);
+    c_algorithm::failing(&scene, slow, &["-D_DEFAULT_SOURCE", "-include", "unistd.h"]);
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let ended = scene.controller(Pace::Real).start().wait().expect_code(1);
@@ -98,7 +98,11 @@ fn a_library_that_is_too_slow_is_latched_in_real_time_whatever_the_state() {
 #[test]
 fn a_library_that_never_returns_ends_the_controller_with_what_was_recorded() {
     let scene = scene();
-    own::failing(&scene, "count > 200 && (pause(), 0)", &["-D_DEFAULT_SOURCE", "-include", "unistd.h"]);
+    c_algorithm::failing(
+        &scene,
+        "count > 200 && (pause(), 0)",
+        &["-D_DEFAULT_SOURCE", "-include", "unistd.h"],
+    );
     let _machine = turn::take();
     let emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     scene.controller(Pace::Real).start().wait().expect_code(1).expect_stderr(&["has not returned for 2 s"]);
@@ -111,7 +115,7 @@ fn a_library_that_never_returns_ends_the_controller_with_what_was_recorded() {
 #[test]
 fn a_library_of_another_version_is_refused_before_anything_runs() {
     let scene = scene();
-    own::failing(&scene, "0", &["-DVERSION=99"]);
+    c_algorithm::failing(&scene, "0", &["-DVERSION=99"]);
     let emulator = scene.emulator(Pace::Lockstep).with("--join-timeout 1").start();
     let ended = scene.controller(Pace::Lockstep).start().wait().expect_code(2);
     ended.expect_stderr(&["own_algorithm.so", "version", "99"]);

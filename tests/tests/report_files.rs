@@ -38,9 +38,9 @@ fn others_read_what_a_report_writes() {
     assert_eq!(read.as_object().expect("tags").len(), distributions.len());
     for distribution in distributions {
         let name = distribution["name"].as_str().expect("a name");
-        let own = &distribution["percentiles_ns"];
-        assert_eq!(count(&read[name], "/count"), count(own, "/count"), "{name}");
-        let (theirs_ns, ours_ns) = (count(&read[name], "/max"), count(own, "/max"));
+        let percentiles = &distribution["percentiles_ns"];
+        assert_eq!(count(&read[name], "/count"), count(percentiles, "/count"), "{name}");
+        let (theirs_ns, ours_ns) = (count(&read[name], "/max"), count(percentiles, "/max"));
         // Either end of a bin of three significant digits.
         assert!(theirs_ns.abs_diff(ours_ns) <= ours_ns / 500 + 1, "{name}: {theirs_ns} and {ours_ns}");
     }

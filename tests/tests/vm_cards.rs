@@ -153,10 +153,10 @@ impl CardRun {
     /// Frames on `can1` from the far end of the wire, of the rig and foreign ones, and those of the controllers.
     fn heard_by_sender(&self) -> (u64, u64) {
         let by_the_controllers = |id: u16| matches!(id, 0x10A | 0x10B | 0x110 | 0x111 | 0x150..=0x157);
-        let own =
+        let from_controllers =
             self.heard.iter().filter(|frame| frame.standard_id().is_some_and(by_the_controllers)).count()
                 as u64;
-        (self.logged - own, own)
+        (self.logged - from_controllers, from_controllers)
     }
 
     /// A card loses what its receive FIFO does not take, and then says so: once for one frame or more. Both directions.

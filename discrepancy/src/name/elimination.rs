@@ -126,9 +126,9 @@ impl Selection {
         };
         let best = &refits[0];
         let is_new = |fit: &Refit| {
-            fit.effects
-                .last()
-                .is_some_and(|other| !self.model.effects.iter().any(|own| is_same_effect(own, other)))
+            fit.effects.last().is_some_and(|other| {
+                !self.model.effects.iter().any(|of_model| is_same_effect(of_model, other))
+            })
         };
         refits[1..]
             .iter()

@@ -166,7 +166,7 @@ fn classes<'a>(
 /// Whether a model has all large effects of another one among its own.
 fn has_all(model: &Refit, other: &Refit) -> bool {
     let large_of_model = large(model);
-    large(other).iter().all(|effect| large_of_model.iter().any(|own| is_same_effect(own, effect)))
+    large(other).iter().all(|effect| large_of_model.iter().any(|of_model| is_same_effect(of_model, effect)))
 }
 
 fn differ_by_alike(

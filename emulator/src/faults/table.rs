@@ -116,14 +116,14 @@ pub(crate) const NODES: [(&str, WireNode); 3] = [
 
 impl Places {
     pub(crate) fn names(self) -> Vec<String> {
-        let own = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
+        let owned = |names: &[&str]| names.iter().map(|name| (*name).to_owned()).collect();
         let frame = |name: &str| format!("bus.{name}");
         match self {
-            Self::Axis => own(&Axis::ALL.map(Axis::name)),
-            Self::Chamber => own(&["drive.a", "drive.b", "load.a", "load.b"]),
-            Self::Supply => own(&["supply"]),
-            Self::Linkage => own(&["linkage"]),
-            Self::Bus => own(&["bus"]),
+            Self::Axis => owned(&Axis::ALL.map(Axis::name)),
+            Self::Chamber => owned(&["drive.a", "drive.b", "load.a", "load.b"]),
+            Self::Supply => owned(&["supply"]),
+            Self::Linkage => owned(&["linkage"]),
+            Self::Bus => owned(&["bus"]),
             Self::Node => NODES.iter().map(|(name, _)| (*name).to_owned()).collect(),
             Self::Counted => COUNTED.iter().map(|(name, _)| frame(name)).collect(),
             Self::Frames => std::iter::once("bus".to_owned())

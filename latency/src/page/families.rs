@@ -88,8 +88,8 @@ pub(super) fn families(distributions: &[Distribution]) -> Vec<Family<'_>> {
         // The rig first.
         processes.sort_by_key(|process| *process != EMULATOR);
         for name in processes {
-            let own = members.iter().copied().filter(|one| process(&one.name) == name).collect();
-            found.push((format!("{title}: {name}"), about, own));
+            let stages = members.iter().copied().filter(|one| process(&one.name) == name).collect();
+            found.push((format!("{title}: {name}"), about, stages));
         }
     }
     let non_empty = found.into_iter().filter(|(_, _, members)| !members.is_empty());

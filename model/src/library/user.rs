@@ -58,8 +58,8 @@ impl Library {
     /// File and line, and what is wrong there.
     pub fn of_user(name: &str, file: &Path) -> Result<Self, String> {
         let text = std::fs::read_to_string(file).map_err(|why| format!("{}: {why}", file.display()))?;
-        let own = library(name, &text, file).and_then(|own| own.checked(&text, file));
-        own.map_err(|error| error.to_string())
+        let checked = library(name, &text, file).and_then(|library| library.checked(&text, file));
+        checked.map_err(|error| error.to_string())
     }
 
     /// Checks that each name in its expressions is one of its own. Those that ship are bound in tests.
@@ -83,7 +83,7 @@ impl Library {
             }
             let variable = |name: &str| self.variables.iter().any(|one| one.name == name);
             let is_known = |name: &String| {
-                name == PLACE || RESERVED.contains(&name.as_str()) || variable(name) || entry.has_own(name)
+                name == PLACE || RESERVED.contains(&name.as_str()) || variable(name) || entry.defines(name)
             };
             let mut used = entry.texts().into_iter().flat_map(names);
             if let Some(name) = used.find(|name| !is_known(name)) {

@@ -4,7 +4,7 @@ use super::Reader;
 use crate::check::{dimension, target_dimension};
 use crate::file::{Change, Expression, Memory, Parameter, Start, State, Suspect, Target};
 use crate::library::{Entry, EntryFriction, Library, LibrarySuspect, PLACE, Quantity};
-use crate::names::{Symbol, named_parts, own_name};
+use crate::names::{Symbol, marked_name, named_parts};
 use crate::units::{Dimension, Unit};
 use expression::grammar::{Binding, ExpressionError, Kind, NodeId, is_name_character, renamed};
 use settings::{Result, Section, SettingsError, Text};
@@ -33,8 +33,8 @@ impl LibraryBinding<'_> {
     /// What is bound to a name of the library's expressions.
     fn binding(&self, name: &str) -> Option<Binding> {
         let variable = self.bound.iter().find(|(variable, _)| *variable == name);
-        let own = || self.entry.has_own(name).then(|| Binding::Name(own_name(name)));
-        variable.map(|(_, place)| Binding::Expression(*place)).or_else(own)
+        let part = || self.entry.defines(name).then(|| Binding::Name(marked_name(name)));
+        variable.map(|(_, place)| Binding::Expression(*place)).or_else(part)
     }
 
     /// An expression of the library in the words of the file.

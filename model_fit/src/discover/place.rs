@@ -175,9 +175,9 @@ fn groups(model: &Model, first: usize, terms: &[Term]) -> Vec<Group> {
 
 /// Of places that explain as much the one that is said: a function of an input is said of the input.
 fn rank(target: model::Target, name: &str, variables: &[String]) -> usize {
-    let is_its_own = matches!(target, model::Target::Input(_)) && variables.iter().any(|one| one == name);
+    let reads_target = matches!(target, model::Target::Input(_)) && variables.iter().any(|one| one == name);
     match target {
-        model::Target::Input(_) if is_its_own => 0,
+        model::Target::Input(_) if reads_target => 0,
         model::Target::State(_) => 1,
         model::Target::Definition(_) => 2,
         model::Target::Output(_) => 3,

@@ -109,20 +109,20 @@ pub(crate) fn flow(kv: f64, far: f64, chamber: f64) -> f64 {
 
 impl Reference {
     pub(crate) fn from_state(state: &State) -> Self {
-        let axis = |i: usize| {
-            let own = &state.axes[i];
+        let of_axis = |i: usize| {
+            let axis = &state.axes[i];
             ReferenceAxis {
-                x: if i == 0 { own.extension_m } else { STROKE - own.extension_m },
-                v: if i == 0 { own.rod_velocity_m_per_s } else { -own.rod_velocity_m_per_s },
-                s: own.spool,
-                p_a: own.stored_air_a_j / (DEAD_VOLUME + AREA_A * own.extension_m),
-                p_b: own.stored_air_b_j / (DEAD_VOLUME + AREA_B * (STROKE - own.extension_m)),
-                q_a: own.flow_a_m3_per_s,
-                q_b: own.flow_b_m3_per_s,
+                x: if i == 0 { axis.extension_m } else { STROKE - axis.extension_m },
+                v: if i == 0 { axis.rod_velocity_m_per_s } else { -axis.rod_velocity_m_per_s },
+                s: axis.spool,
+                p_a: axis.stored_air_a_j / (DEAD_VOLUME + AREA_A * axis.extension_m),
+                p_b: axis.stored_air_b_j / (DEAD_VOLUME + AREA_B * (STROKE - axis.extension_m)),
+                q_a: axis.flow_a_m3_per_s,
+                q_b: axis.flow_b_m3_per_s,
             }
         };
         Reference {
-            axes: [axis(0), axis(1)],
+            axes: [of_axis(0), of_axis(1)],
             supply: state.supply_pressure_pa,
             stopped: state.emergency_stop,
             linked: state.linked,

@@ -1,4 +1,4 @@
-//! Packets from and to a socket in batches, with what the kernel knows of each: arrival time, own echo, lost packets.
+//! Packets from and to a socket in batches, with what the kernel knows of each: arrival time, whether it was sent here, lost packets.
 //!
 //! `socketcan` 4.0 drops the overflow count and the message flags, rustix does not know these control messages; a
 //! small `recvmmsg` keeps them. The arrival stamp matters: a command is latched by when it *arrived*, not by when a
@@ -33,11 +33,11 @@ pub(super) struct Packet {
     /// Packets dropped at this socket's queue so far, modulo 2^32; only SocketCAN tells.
     pub(super) overflow: Option<u32>,
     /// Whether we sent this packet ourselves.
-    pub(super) own_echo: bool,
+    pub(super) sent_here: bool,
 }
 
 const NO_PACKET: Packet =
-    Packet { bytes: [0; LONGEST_PACKET], len: 0, stamp_ns: 0, overflow: None, own_echo: false };
+    Packet { bytes: [0; LONGEST_PACKET], len: 0, stamp_ns: 0, overflow: None, sent_here: false };
 
 /// Whether a call may sleep until a packet comes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,7 +161,7 @@ unsafe fn note(packet: &mut Packet, header: &libc::mmsghdr) -> Option<libc::time
     let truncated = header.msg_hdr.msg_flags & libc::MSG_TRUNC != 0;
     // A truncated packet is longer than any we know; saying so by its length makes it malformed.
     packet.len = if truncated { LONGEST_PACKET } else { header.msg_len as usize };
-    packet.own_echo = header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0;
+    packet.sent_here = header.msg_hdr.msg_flags & libc::MSG_CONFIRM != 0;
     packet.overflow = None;
     let mut arrived = None;
     // SAFETY: the CMSG macros walk the control buffer within msg_controllen; each payload is read unaligned with the type

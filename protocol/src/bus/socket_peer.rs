@@ -149,7 +149,7 @@ impl<L: Link> SocketPeer<L> {
             self.counters.dropped_on_receive += u64::from(overflow.wrapping_sub(self.overflow_seen));
             self.overflow_seen = overflow;
         }
-        if packet.own_echo {
+        if packet.sent_here {
             return None;
         }
         if packet.len == CONTROL_BYTES

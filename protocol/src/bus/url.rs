@@ -256,10 +256,10 @@ mod tests {
     #[test]
     fn without_an_absolute_runtime_folder_the_default_bus_is_in_a_folder_of_the_users_own() {
         assert_eq!(default_folder(Some("/run/user/7".into())), PathBuf::from("/run/user/7/airbench"));
-        let own = default_folder(None);
-        assert!(own.is_absolute() && own != std::env::temp_dir(), "{}", own.display());
+        let folder = default_folder(None);
+        assert!(folder.is_absolute() && folder != std::env::temp_dir(), "{}", folder.display());
         for none in ["", "relative"] {
-            assert_eq!(default_folder(Some(none.into())), own, "XDG_RUNTIME_DIR={none:?}");
+            assert_eq!(default_folder(Some(none.into())), folder, "XDG_RUNTIME_DIR={none:?}");
         }
     }
 

@@ -72,10 +72,10 @@ fn a_thousand_periods(plant: &mut Plant, inputs: &[Inputs]) {
 
 /// Instructions of a case, counted in a process of its own.
 fn count(name: &str) -> u64 {
-    let own = std::env::current_exe().expect("the path of this executable");
+    let executable = std::env::current_exe().expect("the path of this executable");
     let counted = Command::new("valgrind")
         .args(["--tool=callgrind", "--callgrind-out-file=/dev/null", "--toggle-collect=*a_thousand_periods*"])
-        .arg(own)
+        .arg(executable)
         .env(COUNTED, name)
         .output()
         .expect("valgrind is installed");

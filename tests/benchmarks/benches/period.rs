@@ -104,11 +104,11 @@ impl Shared {
         let plant = |i: usize| Plant::in_state(rig, &scenario.states[i * each]).expect("a recorded state");
         let fresh = Batch::new((0..rigs).map(plant).collect()).with_registers(registers);
         let inputs = (0..each).map(|k| (0..rigs).map(|i| scenario.inputs[i * each + k]).collect()).collect();
-        let own = Shared { rigs, registers, fresh, inputs, ns: f64::INFINITY };
-        for (i, plant) in own.passed().plants()[..rigs - 1].iter().enumerate() {
+        let shared = Shared { rigs, registers, fresh, inputs, ns: f64::INFINITY };
+        for (i, plant) in shared.passed().plants()[..rigs - 1].iter().enumerate() {
             assert_eq!(*plant.state(), scenario.states[(i + 1) * each], "rig {i} of {rigs} in {registers:?}");
         }
-        own
+        shared
     }
 
     fn passed(&self) -> Batch {

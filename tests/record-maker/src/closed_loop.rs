@@ -304,8 +304,8 @@ fn truth(rig: &Rig, state: &State, derivatives: &Derivatives) -> [TrueAxis; 2] {
         let air = if rig.active[i] { derivatives.air[i] } else { axis.air(y, state.supply_pa) };
         let temperature = |chamber: usize| {
             let nominal_k = axis.numbers.temperature_k;
-            let has_own = axis.laws.heat_w_per_m2_k.is_some();
-            if has_own { nominal_k * y[AIR + chamber] / y[NORMAL + chamber] } else { nominal_k }
+            let exchanges_heat = axis.laws.heat_w_per_m2_k.is_some();
+            if exchanges_heat { nominal_k * y[AIR + chamber] / y[NORMAL + chamber] } else { nominal_k }
         };
         TrueAxis {
             extension_m: y[X],

@@ -116,14 +116,14 @@ fn a_foreign_form_differs_from_the_catalogues_and_means_the_same() {
     let mut unlike = Vec::new();
     for sheet in SHEETS {
         let recipe = recipe(vec![hidden(sheet, |drawn| (drawn[0] * drawn[1]).sqrt())]);
-        let own = replay(&recipe, &rig(), &valves).unwrap();
+        let of_catalogue = replay(&recipe, &rig(), &valves).unwrap();
         let null = &null[usize::from(recipe.both_axes)];
         let name = sheet.name;
         let mut others = Vec::new();
         // Alike: the same direction within 45 degrees, far within 70; the size within a factor of three.
         for (form, least_cosine) in [(Form::Near, 0.7), (Form::Far, 0.34)] {
             let foreign = replay(&Recipe { form, ..recipe.clone() }, &rig(), &valves).unwrap();
-            let [one, other, cosine] = comparison::from_null(null, &own, &foreign, 2);
+            let [one, other, cosine] = comparison::from_null(null, &of_catalogue, &foreign, 2);
             // The growth of a rest moves a few instants of break-away: in a free run of the far form they are others.
             if form == Form::Far && name == "rest-time-dependent-break-away" {
                 others.push(foreign);
@@ -140,7 +140,7 @@ fn a_foreign_form_differs_from_the_catalogues_and_means_the_same() {
         let [near, far] = &others[..] else { panic!("two other forms") };
         // The near form of heat exchange is different enough.
         let is_one_more = differ(near, far) || name == "heat-exchange";
-        assert!(differ(&own, near) && differ(&own, far) && is_one_more, "{name}");
+        assert!(differ(&of_catalogue, near) && differ(&of_catalogue, far) && is_one_more, "{name}");
     }
     assert!(unlike.is_empty(), "{unlike:#?}");
 }
@@ -208,10 +208,10 @@ fn halving_the_step_changes_next_to_nothing_with_the_stiffest_effects() {
     ];
     for (name, end) in stiff {
         let recipe = recipe(vec![hidden(plant::effects::sheet(name).expect("known"), |drawn| drawn[end])]);
-        let own = replay_with(&recipe, &rig(), &valves, STEPS_PER_MS).unwrap();
+        let full_step = replay_with(&recipe, &rig(), &valves, STEPS_PER_MS).unwrap();
         let halved = replay_with(&recipe, &rig(), &valves, 2 * STEPS_PER_MS).unwrap();
-        let null = Record { rows: own.rows.clone(), ..own.clone() };
-        let [_, rms, _] = comparison::from_null(&null, &own, &halved, 2);
+        let null = Record { rows: full_step.rows.clone(), ..full_step.clone() };
+        let [_, rms, _] = comparison::from_null(&null, &full_step, &halved, 2);
         // A free run under given commands, in which errors persist: a fifth of the noise.
         assert!(rms < 0.2, "{name}: {rms}");
     }

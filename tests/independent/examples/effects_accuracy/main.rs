@@ -43,8 +43,8 @@ fn tables() -> String {
 }
 
 fn row(out: &mut String, name: &str, window: &Window) {
-    let [own, half, quarter] = SUBSTEPS.map(|substeps| window.difference(substeps));
-    let Difference { truth, shown, velocity, behind, bristles, .. } = own;
+    let [whole, half, quarter] = SUBSTEPS.map(|substeps| window.difference(substeps));
+    let Difference { truth, shown, velocity, behind, bristles, .. } = whole;
     let numbers = truth.into_iter().chain(shown).chain([velocity, behind, bristles]);
     let finer = [half.worst(), quarter.worst()];
     let cells: Vec<String> = numbers.chain(finer).map(|number| format!("{number:.5}")).collect();

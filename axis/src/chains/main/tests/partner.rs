@@ -182,7 +182,7 @@ fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
         let since = pair.cycle;
         pair.run_to(S::Fault);
         assert_eq!(pair.faults()[0], Some(Fault::PartnerNotOk), "{state}");
-        let own_s = match state {
+        let length_s = match state {
             S::InitialPositioning => short().approach_longest_s,
             S::Preparing => 0.0,
             S::InitialForce => 0.2,
@@ -190,7 +190,7 @@ fn a_partner_that_does_not_get_ready_ends_in_a_fault_of_that_name() {
             _ => 0.3,
         };
         let cycles = (pair.cycle - since) as f64 * 1e-3;
-        assert!((cycles - own_s - 2.1).abs() < 0.01, "{state}: {cycles} s");
+        assert!((cycles - length_s - 2.1).abs() < 0.01, "{state}: {cycles} s");
     }
 }
 
