@@ -65,9 +65,9 @@ const STEPS: usize = 5;
 const LACK_OF_FIT_PER_DOF: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the rod end meets the carriage: the true model leaves up to 0.2.
 const LACK_OF_FIT_PER_DOF_LINKED: f64 = 0.3;
-/// Screened gain below which no candidate is fitted; also the least gain of an effect that joins, of a homogeneous one, and that
-/// of a detection limit. An empirical value, about twice what chance gives: of forty independent null gains (chi2 of one degree
-/// of freedom) the largest has the median 5.7 and the 99th percentile 13.4.
+/// Screened gain that the best candidate must have for a round to be fitted; also the least gain of an effect that joins, of a
+/// homogeneous one, and that of a detection limit. An empirical value, about twice what chance gives: of forty independent null
+/// gains (chi2 of one degree of freedom) the largest has the median 5.7 and the 99th percentile 13.4.
 pub(crate) const MIN_LOSS_REDUCTION: f64 = 25.0;
 /// Penalty for each fitted parameter of an effect.
 pub(crate) const EFFECT_PARAMETER_PENALTY: f64 = 8.0;

@@ -85,7 +85,7 @@ pub struct Proposal {
     /// Text of the experiment file, if one is proposed.
     pub(crate) experiment_toml: Option<String>,
     /// All entries of the menu that can be rehearsed, the best first.
-    pub(crate) rehearsed: Vec<RehearsedEntry>,
+    pub rehearsed: Vec<RehearsedEntry>,
 }
 
 impl ExperimentDivergences {

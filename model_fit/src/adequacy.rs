@@ -6,7 +6,7 @@
 //!   b^2   = rms^2 - s^2 - model_error^2            what is neither
 //! ```
 //! It is more than noise where b^2 is over half of rms^2, over 3/sqrt(n) of it (three standard errors of s^2/rms^2 beside white
-//! noise) and b over a thousandth of the output's standard deviation. The ratio s^2/rms^2 is that of von Neumann: near 1 for
+//! noise) and b over a thousandth of the output's standard deviation. The ratio s^2/rms^2 is half of von Neumann's: near 1 for
 //! white noise, near 0 for a residual that follows from its neighbours. Noise that is coloured over several samples looks like a
 //! missing term: its file declares `noise`. A missing term below the noise, or faster than the samples, is not seen.
 //!

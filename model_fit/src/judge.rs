@@ -137,7 +137,7 @@ fn judge_by_folds(
         (
             (share / SHARE_LARGE).max(t / T_SMALL),
             format!(
-                "folds in time: {} at {t:.1} clustered standard errors, half or {T_SMALL:.0} of these asked",
+                "folds in time: {} at {t:.1} standard errors over folds, half or {T_SMALL:.0} of these asked",
                 share_in_words(share)
             ),
         ),
@@ -158,11 +158,11 @@ fn judge_by_folds(
         gates.push((share / floor, format!("folds over {over}: {words}, {:.0} % asked", floor * 100.0)));
         gates.push((
             t / T_BANDS,
-            format!("folds over {over}: {t:.1} clustered standard errors, {T_BANDS:.0} asked"),
+            format!("folds over {over}: {t:.1} standard errors over folds, {T_BANDS:.0} asked"),
         ));
     }
     let (score, gate) =
-        gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are three at least");
+        gates.into_iter().min_by(|a, b| a.0.total_cmp(&b.0)).expect("there are four at least");
     let unknowns = after.fitting.unknowns.iter().zip(&after.point.values_si);
     let values_si = unknowns.filter_map(|(unknown, value)| match unknown.id {
         UnknownId::Shared(index) | UnknownId::PerRecord(index, 0)

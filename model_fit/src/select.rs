@@ -338,7 +338,7 @@ fn series(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<Vec<Vec<f64>>>, Fa
     Ok((0..fitting.model.outputs.len()).map(of_output).collect())
 }
 
-/// Samples over the sum of their autocorrelations until one is not positive.
+/// Effective sample size: n / (1 + 2 sum of the autocorrelations up to the first that is not positive), at least 2.
 fn independent(series: &[Vec<f64>], count: f64) -> f64 {
     let sum: f64 = covariance::autocorrelation(series).iter().sum();
     (count / (1.0 + 2.0 * sum)).max(2.0)

@@ -13,12 +13,11 @@
 //!
 //! | symbol | unit, domain | what |
 //! |---|---|---|
-//! | friction_factor | 1, 0 to 1000 | all friction of an axis times this; 1 changes nothing |
+//! | friction_factor | 1, >= 0 | all friction of an axis times this, the product of all such faults; 1 changes nothing |
 //! | added_mass_kg | kg, >= 0 | moves with an axis, beside the weights that people put on |
 //! | supply | Pa absolute, s | where the node goes, and how fast |
 //!
-//! Names, ranges and descriptions of faults are the emulator's table; the constructor of that table's values is what keeps
-//! numbers in their range.
+//! Names, ranges and descriptions of faults are the emulator's table, which keeps the numbers of each fault in their range.
 //!
 //! Source: kinds of faults: Isermann, Fault-Diagnosis Systems, 2006, ch. 2 and 7, DOI 10.1007/3-540-30368-5; laws: as named in
 //! each file; ranges: guesses, wide enough for what a test plan asks for.
@@ -48,7 +47,7 @@ pub struct Faults {
 pub struct AxisFaults {
     /// Faults of the proportional valve.
     pub valve: ValveFault,
-    /// All its friction times this, 0 to 1000.
+    /// All its friction times this; the product of all such faults.
     pub friction_factor: f64,
     /// Mass that moves with it, kg, on top of everything else.
     pub added_mass_kg: f64,

@@ -13,7 +13,7 @@
 //! The equations have corners: sticking, breaking away, turning round, making contact, meeting an end of the stroke,
 //! check valves moving. A substep first assumes that none lies in it ([`Integrator::smooth`], which branches only on
 //! being linked and in contact), then checks; if one does, it is discarded and made again in eight parts that locate it
-//! ([`Integrator::careful`]). So corners cost time only where they are.
+//! ([`Integrator::in_parts`]). So corners cost time only where they are.
 //!
 //! Why this scheme and this step: `docs/integration.md` has the measured table of error and cost for this and
 //! other schemes; `cargo run --release -p plant --example accuracy` makes it.

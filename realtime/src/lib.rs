@@ -1,6 +1,6 @@
 //! Time: clocks, the periodic loop, priority and pinning, histograms of lateness.
 //!
-//! This room knows when something is due and how late it came, and nothing of what is done then: no bus, no plant,
+//! This crate knows when something is due and how late it came, and nothing of what is done then: no bus, no plant,
 //! no protocol. Whoever runs a cycle brings the work; the loop brings the deadline and the statistics.
 //!
 //! ```text

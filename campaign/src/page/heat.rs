@@ -21,8 +21,8 @@ pub(super) fn section(campaign: &Campaign, results: &Results, shown: &[String]) 
     if axes.is_empty() {
         return String::new();
     }
-    let mut text = "<h2>Medians over the varied values</h2>\n<p class=\"soft\">In each field the median of its runs; the stronger its \
-                    colour, the larger. A range is cut into classes of equal width, or of equal ratio.</p>\n"
+    let mut text = "<h2>Medians over the varied values</h2>\n<p class=\"soft\">In each field the median of its runs; the \
+                    stronger its colour, the larger. A range is cut into classes of equal width, or of equal ratio.</p>\n"
         .to_owned();
     for figure in shown {
         let Some(column) = results.numbers(figure) else { continue };

@@ -2,7 +2,8 @@
 //! the deciding one (`probabilities.rs`) and decides nothing.
 //!
 //! ```text
-//!   Z_j = sum over sizes and correlation lengths of the term:  prior of both, times p(e | j, size, length)     (fit/evidence.rs)
+//!   Z_j = sum over sizes and correlation lengths of the term:  prior of both, times Z(j, size, length)         (fit/evidence.rs)
+//!   Z(j, size, length) = integral of p(e | j, coordinates, size, length)^POWER prior(coordinates) d coordinates
 //!   probability_j = prior_j Z_j / sum_k prior_k Z_k
 //! ```
 //!

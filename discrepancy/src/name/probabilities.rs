@@ -24,7 +24,7 @@ const VARIATION_SCALE: f64 = 0.1;
 const LARGEST_RATIO: f64 = 10.0;
 /// What effects count as whose amplitudes cannot be compared between windows: they vary by as much as their size.
 const UNKNOWN_VARIATION: f64 = 1.0;
-/// Parameters that are moved by less are those of the rig file, and by so much they count as off.
+/// Lower bound of the soft count of moved parameters, and the count at which its logarithm is 0.
 const SMALLEST_MOVED: f64 = 1e-3;
 const MOVED_SCALE: f64 = 0.1;
 

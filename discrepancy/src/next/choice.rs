@@ -62,7 +62,7 @@ impl Probability {
 
 /// An entry of the menu with its trials.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct RehearsedEntry {
+pub struct RehearsedEntry {
     pub(crate) name: &'static str,
     pub(crate) trials: Vec<Trial>,
     /// Without initial positioning, s.

@@ -63,7 +63,7 @@ pub(super) fn limits(report: &Report) -> String {
         if !limits.is_empty() {
             text += &heading("Detection limits");
             text += &paragraph(
-                "The smallest amplitude of each other effect that these records would have shown.",
+                "Decision limit of each other effect (Currie): an effect of this size is found in half of such records or fewer.",
             );
             text += &folded(&format!("Limits of {} effects", report.detection_limits.len()), &limits);
         }

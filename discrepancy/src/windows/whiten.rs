@@ -50,7 +50,8 @@ impl Windows<'_> {
     }
 
     /// Whitens a window: jitter, common to all readings of an instant (of an axis, where they are apart), by (I + d d')^(-1/2)
-    /// with d their rates times the jitter over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2).
+    /// with d their rates times the jitter over the noise; then AR(1) noise by (e_n - r e_(n-1)) / sqrt(1 - r^2), r the lag-1
+    /// correlation over 1 + d^2. The first sample of a window is not transformed.
     pub(super) fn whiten(&self, at: usize, window: &mut [f64]) {
         let width = self.outputs.len();
         let sensitivities = &self.jitter_sensitivity[at * self.rows()..][..self.rows()];

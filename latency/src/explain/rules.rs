@@ -6,7 +6,7 @@
 //! |---|---|
 //! | the process was continued by SIGCONT in these cycles | emulator-stopped, controller-stopped |
 //! | the probe saw the CPU stand still, no thread running on it, for half of it or more | machine-stood-still |
-//! | as the next, and the other process was late in the same moment without waiting for a CPU | machine-stood-still |
+//! | cpu-contention as below, and the other process was late in the same moment without waiting for a CPU | machine-stood-still |
 //! | the thread waited for the CPU for half of it or more, in the worst cycle or over all of the event | cpu-contention |
 //! | more page faults than 20, or faults that explain a third of it | page-faults |
 //! | slow work; another CPU stood still for half of it, or the other process was late in the same moment | machine-stood-still |

@@ -15,7 +15,7 @@ use crate::parameters::table::Unit;
 pub struct Sheet {
     /// Name in rig files and reports, as `piston-leakage`.
     pub name: &'static str,
-    /// Room of the catalogue.
+    /// Group of the catalogue.
     pub group: Group,
     /// Where it can be switched on.
     pub place: PlaceKind,
@@ -116,7 +116,7 @@ impl EffectKey {
     }
 }
 
-/// Rooms of the catalogue.
+/// Groups of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
     /// Valve, lines, silencer, supply.

@@ -1,4 +1,4 @@
-//! The one screen: what each effect adds to, balance by balance, in the order in which it is summed.
+//! What each effect adds to, balance by balance, in the order in which it is summed.
 //!
 //! A balance is a baseline value and one named term for each effect that acts on it. A term is a function of the state and of
 //! the balances above it, never of another term of its own balance: switching an effect off changes the sum by exactly its
@@ -57,7 +57,7 @@ balance!(/** K_V of an edge at an opening; the floor of the leakage is under wha
     Characteristic "characteristic" in "m3_per_h" = table + valve_characteristic);
 balance!(/** K_V of an edge with its floor. */
     Edge "edge" in "m3_per_h" = characteristic + valve_null_leakage);
-balance!(/** Pressure behind the supply edges, and behind the exhaust edges of an axis. */
+balance!(/** Pressure behind the supply edges. */
     SupplySide "supply_side" in "Pa" = node + supply_droop);
 balance!(/** Pressure behind the exhaust edges of an axis. */
     ExhaustSide "exhaust_side" in "Pa" = exhaust + silencer_back_pressure);

@@ -1,4 +1,4 @@
-//! Packets from and to a socket in batches, with what the kernel knows of each: arrival time, whether it was sent here, lost packets.
+//! Packets from and to a socket in batches, with what the kernel knows of each: arrival time, whether we sent it, lost packets.
 //!
 //! `socketcan` 4.0 drops the overflow count and the message flags, rustix does not know these control messages; a
 //! small `recvmmsg` keeps them. The arrival stamp matters: a command is latched by when it *arrived*, not by when a

@@ -47,7 +47,7 @@ macro_rules! rows {
     };
 }
 
-/// The eight faults of a kind of sensor: its name, channel, places, unit, the unit in keys, the end of its range, a small
+/// The faults of a kind of sensor: its name, channel, places, unit, the unit in keys, the end of its range, a small
 /// error.
 macro_rules! sensor {
     ($quantity:literal, $channel:ident, $places:ident, $unit:literal, $suffix:literal, $most:literal, $small:literal) => {
