@@ -8,15 +8,13 @@ pub(crate) mod cli;
 use crate::warn;
 use cli::{CanArguments, InterfaceArgument};
 use protocol::bus::host::Host;
-use protocol::bus::{BusError, BusUrl};
+use protocol::bus::{BusError, BusUrl, HostThread};
 use protocol::exit::Exit;
 use realtime::{Interrupt, Request};
 use socketcan_guest::{Guest, GuestError, NamedInterface};
 use std::io;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 /// The interface of `--bus`.
@@ -81,19 +79,13 @@ fn try_to_run(arguments: &CanArguments) -> Result<i32, CanError> {
         return Err(CanError::KernelBus(arguments.bus.clone()));
     };
     let host = Host::bind(path, *wire, None)?;
-    let stop = Arc::new(AtomicBool::new(false));
-    let stopped = Arc::clone(&stop);
-    let serving = std::thread::spawn(move || {
-        let _grants = realtime::acquire(&answering());
-        host.serve(&stopped)
-    });
+    let host = HostThread::start(host, || realtime::acquire(&answering()));
     let ran = if arguments.command.is_empty() {
         wait_for_the_end(&arguments.bus)
     } else {
         run_program(arguments, &named)
     };
-    stop.store(true, Ordering::Relaxed);
-    let report = serving.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?;
+    let report = host.stop()?;
     if arguments.command.is_empty() {
         let dropped: u64 = report.peers.iter().map(|peer| peer.dropped_at_queue.total()).sum();
         warn(&format!("the bus carried {} frames; {dropped} did not fit the queue of a peer", report.frames));
@@ -115,7 +107,7 @@ fn run_program(arguments: &CanArguments, named: &[NamedInterface]) -> Result<i32
 
 /// Real-time request of the answering threads. An unprivileged user is refused, and the program runs without it.
 fn answering() -> Request {
-    Request { fifo_priority: Some(FIFO_PRIORITY), timer_slack: true, ..Request::default() }
+    Request::for_a_server(Some(FIFO_PRIORITY))
 }
 
 fn wait_for_the_end(bus: &BusUrl) -> Result<i32, CanError> {

@@ -15,7 +15,7 @@
 //! | [`console`] | typed commands |
 //! | [`telemetry`] | the stream to viewers |
 //! | [`seal`], [`catalogue`] | drawing hidden effects, listing all effects |
-//! | [`run`], [`inputs`], [`host_thread`], [`cli`], [`program`] | runs, their inputs, the command line |
+//! | [`run`], [`inputs`], [`cli`], [`program`] | runs, their inputs, the command line |
 
 #![warn(missing_docs)] // an interface of other crates
 
@@ -27,7 +27,6 @@ mod event;
 mod exchange;
 pub mod faults;
 mod finish;
-mod host_thread;
 mod inputs;
 mod node;
 mod pace;

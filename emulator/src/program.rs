@@ -40,17 +40,14 @@ fn host_bus(arguments: &BusArguments) -> Result<Exit, RunError> {
         return Err(RunError::Input("only an embedded bus, unix:///PATH, needs a host".into()));
     };
     let interrupt = run::watch_interrupt()?;
-    let host = crate::host_thread::HostThread::start(
-        Host::bind(path, *wire, None)?,
-        Some(DEFAULT_FIFO_PRIORITY + 1),
-    );
+    let host = run::start_host(Host::bind(path, *wire, None)?, Some(DEFAULT_FIFO_PRIORITY + 1));
     protocol::say!("emulator: hosting {}; Ctrl-C ends it", arguments.bus);
     let began = Instant::now();
     let time_up = || arguments.seconds.is_some_and(|seconds| began.elapsed().as_secs_f64() >= seconds);
     while !interrupt.came() && !time_up() {
         std::thread::sleep(Duration::from_millis(20));
     }
-    let Some(report) = host.stop() else { return Ok(Exit::BusFailed) };
+    let Some(report) = run::stop_host(host) else { return Ok(Exit::BusFailed) };
     // A closed pipe is no error.
     let _ = writeln!(std::io::stdout(), "{}", serde_json::to_string_pretty(&report).unwrap_or_default());
     Ok(if time_up() { Exit::Good } else { Exit::Interrupted })

@@ -12,7 +12,6 @@ use crate::cli::RunArguments;
 use crate::console::{self, Command, Console};
 use crate::faults::schedule::FaultSchedule;
 use crate::finish::finish;
-use crate::host_thread::HostThread;
 use crate::inputs::{Inputs, Script};
 use crate::node::{EmulatorNode, NodeFigures, NodeParts};
 use crate::pace::{self, Limits, Pace, RunContext, RunOutcome, Shared};
@@ -24,7 +23,9 @@ use crossbeam_channel::Receiver;
 use plant::{People, Sensors};
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
-use protocol::bus::{self, Bus, BusCounters, BusError, BusUrl, HostedRig, StampClock, WireOrders};
+use protocol::bus::{
+    self, Bus, BusCounters, BusError, BusUrl, HostThread, HostedRig, StampClock, WireOrders,
+};
 use protocol::exit::Exit;
 use realtime::{
     Clock, Continued, Freeze, Grants, Interrupt, Machine, MonotonicClock, PeriodicConfig, Request,
@@ -103,7 +104,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let writer = match checked.and_then(|()| open_folder(arguments, &inputs, &started, console.clone())) {
         Ok(writer) => writer,
         Err(error) => {
-            host.map(HostThread::stop);
+            drop(host);
             return Err(error);
         }
     };
@@ -134,7 +135,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         print_progress(&rig_loop, &shared);
         let outcome = join(rig_loop);
         let written = join(writer);
-        let thread_report = host.and_then(HostThread::stop);
+        let thread_report = host.and_then(stop_host);
         let mut outcome = outcome?;
         outcome.host = outcome.host.or(thread_report);
         finish(arguments, &started, outcome, written)
@@ -272,7 +273,7 @@ fn open_bus(arguments: &RunArguments, clock: StampClock) -> Result<OpenedBus, Ru
         Ok(host) => {
             let orders = Some(host.wire_orders());
             let fifo = (!arguments.no_realtime).then_some(arguments.fifo_priority + 1);
-            let host = Some(HostThread::start(host, fifo));
+            let host = Some(start_host(host, fifo));
             Ok(OpenedBus { bus: bus::open(&arguments.bus, clock)?, host, orders })
         }
         // A barrier has one rig, which hosts it: a second emulator would replace the first.
@@ -282,6 +283,17 @@ fn open_bus(arguments: &RunArguments, clock: StampClock) -> Result<OpenedBus, Ru
         }
         Err(error) => Err(error.into()),
     }
+}
+
+/// Starts the thread of the host, with FIFO priority if it is asked for and granted: the rig loop makes the same request and
+/// reports refusals.
+pub(crate) fn start_host(host: Host, fifo_priority: Option<u8>) -> HostThread {
+    HostThread::start(host, move || realtime::acquire(&Request::for_a_server(fifo_priority)))
+}
+
+/// Stops the host and returns its counters; says why where it failed, and returns `None`.
+pub(crate) fn stop_host(host: HostThread) -> Option<HostReport> {
+    host.stop().inspect_err(|error| protocol::say!("emulator: the bus host failed: {error}")).ok()
 }
 
 fn stamp_clock(lockstep: bool, simulated_ns: &Arc<AtomicU64>) -> StampClock {

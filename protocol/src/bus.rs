@@ -17,6 +17,7 @@ mod can_link;
 pub mod control;
 pub mod host;
 mod host_report;
+mod host_thread;
 mod hosted_rig;
 pub mod lockstep;
 mod packets;
@@ -32,6 +33,7 @@ use crate::response_time::rig::TooSlow;
 use std::os::fd::BorrowedFd;
 use std::time::Duration;
 
+pub use host_thread::HostThread;
 pub use hosted_rig::HostedRig;
 pub use tally::{FrameTally, OTHERS};
 pub use url::{BusUrl, LONGEST_NAME, UrlError, WireOptions};

@@ -63,6 +63,12 @@ impl Request {
             timer_slack: true,
         }
     }
+
+    /// What a thread wants that serves a loop: a bus host, an answering thread.
+    #[must_use]
+    pub fn for_a_server(fifo_priority: Option<u8>) -> Self {
+        Self { fifo_priority, timer_slack: true, ..Self::default() }
+    }
 }
 
 /// Something that the system gave. Its text is the line in the records of a run, from which it is read again.

@@ -12,13 +12,10 @@ use super::cli::{CheckPace, ConformanceArguments};
 use protocol::bus::control::{Kind, Role};
 use protocol::bus::host::Host;
 use protocol::bus::lockstep::BarrierConfig;
-use protocol::bus::{self, Bus, BusError, BusUrl, HostedRig, Received, StampClock};
+use protocol::bus::{self, Bus, BusError, BusUrl, HostThread, HostedRig, Received, StampClock};
 use protocol::can::CanFrame;
 use protocol::periods::CYCLE;
-use realtime::{Clock, Instant, MonotonicClock};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::thread::JoinHandle;
+use realtime::{Clock, Instant, MonotonicClock, Request};
 use std::time::Duration;
 
 /// Lateness of this process that disturbs the timing of a cycle.
@@ -47,7 +44,7 @@ pub(super) struct ExchangeTiming {
 /// The bus, and its host if it is embedded.
 pub(super) struct RigBus {
     bus: Box<dyn Bus>,
-    server: Option<Server>,
+    host: Option<HostThread>,
     /// In real time, when the next cycle is due.
     due: Option<Instant>,
     barrier_cycle: u32,
@@ -59,7 +56,7 @@ impl RigBus {
         let clock =
             || -> StampClock { Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns)) };
         let lockstep = arguments.pace != CheckPace::Real;
-        let (bus, server): (Box<dyn Bus>, _) = match url {
+        let (bus, host): (Box<dyn Bus>, _) = match url {
             BusUrl::Can { .. } if lockstep => return Err(BusError::NoBarrier { url: url.to_string() }),
             BusUrl::Can { .. } => (bus::open(url, clock())?, None),
             BusUrl::Unix { path, wire } if lockstep => {
@@ -73,11 +70,14 @@ impl RigBus {
                 (Box::new(rig), None)
             }
             BusUrl::Unix { path, wire } => {
-                let server = Server::start(Host::bind(path, *wire, None)?);
-                (bus::open(url, clock())?, Some(server))
+                // Above the loop, as the emulator's host; the loop reports refusals.
+                let request = Request::for_a_server(Some(super::FIFO_PRIORITY + 1));
+                let host = Host::bind(path, *wire, None)?;
+                let host = HostThread::start(host, move || realtime::acquire(&request));
+                (bus::open(url, clock())?, Some(host))
             }
         };
-        Ok(Self { bus, server, due: (!lockstep).then(|| MonotonicClock.now()), barrier_cycle: 0 })
+        Ok(Self { bus, host, due: (!lockstep).then(|| MonotonicClock.now()), barrier_cycle: 0 })
     }
 
     /// Waits until the barrier begins; returns at once in real time.
@@ -142,34 +142,9 @@ impl RigBus {
 
 impl Drop for RigBus {
     fn drop(&mut self) {
-        if let Some(server) = self.server.take() {
-            server.stop.store(true, Ordering::Relaxed);
-            // The thread ends by itself; its counters are not needed.
-            let _ = server.thread.join();
+        // Its counters are not needed.
+        if let Some(Err(error)) = self.host.take().map(HostThread::stop) {
+            eprintln!("bench: the bus host failed: {error}");
         }
-    }
-}
-
-/// The host of an embedded bus in its own thread.
-struct Server {
-    stop: Arc<AtomicBool>,
-    thread: JoinHandle<()>,
-}
-
-impl Server {
-    fn start(host: Host) -> Self {
-        let stop = Arc::new(AtomicBool::new(false));
-        let stopped = Arc::clone(&stop);
-        let thread = std::thread::spawn(move || {
-            // Above the loop, as the emulator's host; the loop reports refusals.
-            let fifo_priority = Some(super::FIFO_PRIORITY + 1);
-            let request =
-                realtime::Request { fifo_priority, timer_slack: true, ..realtime::Request::default() };
-            let _grants = realtime::acquire(&request);
-            if let Err(error) = host.serve(&stopped) {
-                eprintln!("bench: the bus host failed: {error}");
-            }
-        });
-        Self { stop, thread }
     }
 }

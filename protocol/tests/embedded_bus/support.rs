@@ -3,14 +3,12 @@
 use protocol::bus::control::{Control, Kind, Role};
 use protocol::bus::host::{Host, HostReport};
 use protocol::bus::lockstep::BarrierConfig;
-use protocol::bus::{self, Bus, BusUrl, Received, StampClock, WireOptions};
+use protocol::bus::{self, Bus, BusUrl, HostThread, Received, StampClock, WireOptions};
 use protocol::can::CanFrame;
 use rustix::net::{AddressFamily, SendFlags, SocketAddrUnix, SocketFlags, SocketType};
 use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, LazyLock};
-use std::thread::JoinHandle;
+use std::sync::LazyLock;
 use std::time::{Duration, Instant};
 
 /// Far beyond what any step here takes on a loaded machine.
@@ -38,10 +36,7 @@ impl Place {
 }
 
 /// A host that serves in a thread of its own.
-pub(crate) struct RunningHost {
-    stop: Arc<AtomicBool>,
-    thread: JoinHandle<std::io::Result<HostReport>>,
-}
+pub(crate) struct RunningHost(HostThread);
 
 impl RunningHost {
     pub(crate) fn start(path: &Path, wire: WireOptions, barrier: Option<BarrierConfig>) -> Self {
@@ -49,9 +44,7 @@ impl RunningHost {
     }
 
     pub(crate) fn serve(host: Host) -> Self {
-        let stop = Arc::new(AtomicBool::new(false));
-        let seen = Arc::clone(&stop);
-        Self { stop, thread: std::thread::spawn(move || host.serve(&seen)) }
+        Self(HostThread::start(host, || ()))
     }
 
     pub(crate) fn plain(path: &Path) -> Self {
@@ -59,8 +52,7 @@ impl RunningHost {
     }
 
     pub(crate) fn stop(self) -> HostReport {
-        self.stop.store(true, Ordering::Relaxed);
-        self.thread.join().expect("the host does not panic").expect("the host serves until it is stopped")
+        self.0.stop().expect("the host serves until it is stopped")
     }
 }
 
