@@ -148,7 +148,7 @@ impl RigView {
     }
 
     fn settle_account(&mut self, tick: &Tick, cycle: u64) {
-        let more = (SKIPPED_RANGE + u64::from(tick.skipped) - self.skipped % SKIPPED_RANGE) % SKIPPED_RANGE;
+        let more = u64::from(tick.skipped.wrapping_sub(self.skipped as u16));
         // A stall of more than a minute wraps the tick's count; the cycles that passed tell how often.
         let passed = self.cycle.map_or(0, |known| cycle.saturating_sub(known));
         self.skipped += more + passed.saturating_sub(more) / SKIPPED_RANGE * SKIPPED_RANGE;

@@ -15,8 +15,6 @@ use std::collections::BTreeMap;
 const STOP_HOLDS_MS: u64 = 500;
 /// Controllers send their chain states every 10 ms; after this silence they are unknown.
 const STATUS_HOLDS_MS: u64 = 1000;
-/// Range of the tick's counter of skipped cycles.
-const SKIPPED_RANGE: u64 = 1 << 16;
 /// Nodes that can hold an emergency stop.
 pub(crate) const STOPPERS: [&str; 4] = ["console", "rig", Axis::Drive.name(), Axis::Load.name()];
 /// Index of the console among them; this program sends its frames too.
@@ -157,7 +155,7 @@ impl Wire {
             self.reset();
         }
         let before = self.skipped_reported.replace(tick.skipped).unwrap_or(tick.skipped);
-        self.skipped += (SKIPPED_RANGE + u64::from(tick.skipped) - u64::from(before)) % SKIPPED_RANGE;
+        self.skipped += u64::from(tick.skipped.wrapping_sub(before));
         match self.cycle {
             None => self.sensors = [Reception::since(reported); 2],
             // A tick after a miss precedes the sensors of its cycle, but no earlier ones.

@@ -17,8 +17,6 @@ use std::path::Path;
 
 const CYCLE_NS: i64 = periods::CYCLE_NS as i64;
 const ROUND: i64 = ALIVE_RANGE as i64;
-/// The tick counts skipped cycles modulo this.
-const SKIPPED_RANGE: u64 = 1 << 16;
 
 /// A frame of a log that `rig.dbc` knows.
 #[derive(Clone, Copy, Debug)]
@@ -128,16 +126,15 @@ fn nearest(expected: i64, low: i64) -> i64 {
 /// Which cycles were skipped: those just before a tick that says so.
 #[derive(Default)]
 struct SkippedCycles {
-    counted: Option<u64>,
+    counted: Option<u16>,
     cycles: BTreeSet<u64>,
 }
 
 impl SkippedCycles {
     fn take(&mut self, tick: &Tick, cycle: i64, before: &[Option<i64>]) {
-        let now = u64::from(tick.skipped);
         // What was skipped before the log began lies outside of it.
-        let more = self.counted.map_or(0, |counted| (SKIPPED_RANGE + now - counted) % SKIPPED_RANGE);
-        self.counted = Some(now);
+        let counted = self.counted.replace(tick.skipped).unwrap_or(tick.skipped);
+        let more = u64::from(tick.skipped.wrapping_sub(counted));
         if more == 0 {
             return;
         }
