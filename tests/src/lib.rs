@@ -21,6 +21,7 @@
 //!   noise ── a babbling node, and whether any of its commands acted
 //!   pairs ─── runs with something and without, in turns, and the table of what it costs
 //!   socketcan  programs of SocketCAN under `bench can`, and what was recorded of them on vcan
+//!   process_table  processes of this machine: names, parents, states, command lines
 //!   stalls ── whether the machine kept a program from running
 //!   viewers ─ ten of the live page, for scripts/viewers
 //! ```
@@ -52,6 +53,7 @@ pub mod onlooker;
 pub mod pairs;
 mod peer;
 mod process;
+pub mod process_table;
 mod records;
 mod scene;
 pub mod skip;

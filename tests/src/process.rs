@@ -1,5 +1,6 @@
 //! A program while it runs, and once it has ended: exit code and all its output.
 
+use crate::process_table::ProcessStat;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::process::{Pid, PidfdFlags, Signal, kill_process, kill_process_group, pidfd_open};
@@ -65,11 +66,7 @@ impl Running {
         let tasks = format!("/proc/{}/task", self.number());
         wait_until("all threads to stand still", || {
             let mut threads = std::fs::read_dir(&tasks).into_iter().flatten().flatten();
-            // The state follows the name, which may hold anything but ends with the last bracket.
-            let stands = |stat: &str| stat.rsplit(')').next().is_some_and(|rest| rest.starts_with(" T"));
-            threads.all(|thread| {
-                std::fs::read_to_string(thread.path().join("stat")).is_ok_and(|stat| stands(&stat))
-            })
+            threads.all(|thread| ProcessStat::read(&thread.path()).is_some_and(|stat| stat.state == 'T'))
         });
     }
 

@@ -3,6 +3,7 @@
 //! A test in real time may fail since the machine stood still, and may be tried again for that reason alone. The watcher reads
 //! each 5 ms how long the threads have waited so far (`/proc/PID/task/TID/schedstat`); if it is late itself, that is a stall too.
 
+use crate::process_table::with_command_line;
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::PathBuf;
@@ -63,12 +64,7 @@ fn watch(word: &str, stop: &AtomicBool) -> Duration {
 
 /// Folders below `/proc`.
 fn programs_with(word: &str) -> Vec<PathBuf> {
-    let processes = fs::read_dir("/proc").into_iter().flatten().flatten().map(|entry| entry.path());
-    let has_word = |path: &PathBuf| {
-        let line = fs::read(path.join("cmdline")).unwrap_or_default();
-        line.split(|byte| *byte == 0).any(|argument| String::from_utf8_lossy(argument).contains(word))
-    };
-    processes.filter(has_word).collect()
+    with_command_line(word).map(|(folder, _)| folder).collect()
 }
 
 /// How long a thread has waited for a processor since it began: the second number, in ns.

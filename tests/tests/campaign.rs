@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 use system_tests::exit::{BAD_INPUT, BOUND_BROKEN, GOOD, INTERRUPTED};
+use system_tests::process_table::ProcessStat;
 use system_tests::small_disk::SmallDisk;
 use system_tests::{
     Build, CompletedProcess, PATIENCE, Program, Running, executable, install, json, skip, workspace,
@@ -304,16 +305,9 @@ fn dask_gives_the_same_bytes_when_a_worker_is_killed() {
 fn worker_at_work(driver: u32) -> rustix::process::Pid {
     let began = Instant::now();
     loop {
-        let processes = fs::read_dir("/proc").expect("/proc").flatten().filter_map(|entry| {
-            let stat = fs::read_to_string(entry.path().join("stat")).ok()?;
-            let (head, tail) = stat.rsplit_once(')')?;
-            let (number, name) = head.split_once(" (")?;
-            let parent: u32 = tail.split_whitespace().nth(1)?.parse().ok()?;
-            Some((number.parse::<u32>().ok()?, name.to_owned(), parent))
-        });
-        let processes: Vec<_> = processes.collect();
+        let processes: Vec<_> = ProcessStat::all().collect();
         let parent = |number: u32| {
-            processes.iter().find(|(process, ..)| *process == number).map(|(_, _, parent)| *parent)
+            processes.iter().find(|process| process.number == number).map(|process| process.parent)
         };
         let below = |mut number: u32| loop {
             match parent(number) {
@@ -324,9 +318,9 @@ fn worker_at_work(driver: u32) -> rustix::process::Pid {
         };
         let worker = processes
             .iter()
-            .find(|(_, name, parent)| name == "campaign" && *parent != driver && below(*parent));
-        if let Some((_, _, worker)) = worker {
-            return rustix::process::Pid::from_raw(*worker as i32).expect("a process");
+            .find(|process| process.name == "campaign" && process.parent != driver && below(process.parent));
+        if let Some(worker) = worker {
+            return rustix::process::Pid::from_raw(worker.parent as i32).expect("a process");
         }
         assert!(began.elapsed() < PATIENCE, "no worker is at work");
         std::thread::sleep(Duration::from_millis(2));

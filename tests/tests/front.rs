@@ -7,6 +7,7 @@ use std::os::unix::fs::{OpenOptionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use system_tests::foreign_python::{of, tools_path};
+use system_tests::process_table::with_command_line;
 use system_tests::{
     Build, CompletedProcess, Program, Running, executable, install, turn, wait_until, workspace,
 };
@@ -196,12 +197,7 @@ fn a_run_in_real_time_and_a_program_of_can_meet_on_the_users_bus_and_a_second_ru
 
 /// Command lines of processes that hold this text.
 fn processes_with(text: &str) -> Vec<String> {
-    let entries = fs::read_dir("/proc").expect("the kernel's list of processes").flatten();
-    let lines = entries.filter_map(|entry| fs::read(entry.path().join("cmdline")).ok());
-    lines
-        .map(|line| String::from_utf8_lossy(&line).replace('\0', " "))
-        .filter(|line| line.contains(text))
-        .collect()
+    with_command_line(text).map(|(_, line)| line).collect()
 }
 
 #[test]

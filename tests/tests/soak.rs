@@ -2,6 +2,7 @@
 
 use rustix::process::{Pid, Signal, kill_process};
 use serde_json::Value;
+use system_tests::process_table::ProcessStat;
 use system_tests::{
     Program, RESTLESS, Running, Scene, count, expect_whole_lines, find, json, turn, wait_until,
 };
@@ -30,15 +31,9 @@ fn check<'a>(segment: &'a Value, name: &str) -> &'a str {
 }
 
 /// Processes of this name that `parent` has started.
-fn children(parent: u32, name: &str) -> Vec<Pid> {
-    let processes = std::fs::read_dir("/proc").expect("/proc").filter_map(Result::ok);
-    let is_child = |pid: &i32| {
-        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-        let rest = stat.rsplit_once(") ").map_or("", |(_, rest)| rest);
-        stat.contains(&format!("({name})")) && rest.split(' ').nth(1) == Some(&parent.to_string())
-    };
-    let pids = processes.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-    pids.filter(is_child).filter_map(Pid::from_raw).collect()
+fn children(parent: u32, name: &str) -> Vec<u32> {
+    let children = ProcessStat::all().filter(|process| process.parent == parent && process.name == name);
+    children.map(|process| process.number).collect()
 }
 
 fn segment_folder(number: u32) -> String {
@@ -83,7 +78,8 @@ fn a_killed_controller_fails_its_segment_alone_and_its_rows_stay() {
     scene.wait_for_rows(&segment_folder(1), 2000);
     let controllers = children(running.number(), "controller");
     assert_eq!(controllers.len(), 1);
-    kill_process(controllers[0], Signal::KILL).expect("it runs");
+    let controller = Pid::from_raw(controllers[0] as i32).expect("a process");
+    kill_process(controller, Signal::KILL).expect("it runs");
     let ended = running.wait().expect_code(1);
     assert!(ended.stderr.contains("may not be trusted: 1 of "), "{}", ended.stderr);
     let soak_json = results(&scene);
@@ -117,11 +113,7 @@ fn a_soak_that_was_killed_or_interrupted_goes_on_with_all_it_had() {
     let first = results(&scene);
     assert_eq!((count(&first, "/totals/segments"), count(&first, "/totals/failed")), (1, 0));
     // Nothing that it started outlives it.
-    let pid = emulators[0].as_raw_pid();
-    wait_until("the emulator ends with its soak", || {
-        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).unwrap_or_default();
-        stat.is_empty() || stat.contains(") Z ")
-    });
+    wait_until("the emulator ends with its soak", || !ProcessStat::is_alive(emulators[0]));
 
     let running = soak(&scene, 0.6);
     scene.wait_for_rows(&segment_folder(3), 2000);

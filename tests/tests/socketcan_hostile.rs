@@ -5,6 +5,7 @@ use rustix::process::Signal;
 use std::fs;
 use std::time::{Duration, Instant};
 use system_tests::foreign_python::python;
+use system_tests::process_table::ProcessStat;
 use system_tests::socketcan::{built, guest, shell, start, start_python};
 use system_tests::{PATIENCE, Pace, Packet, Peer, RESTLESS, Running, SHORT, Scene, count, turn, wait_until};
 
@@ -118,18 +119,6 @@ fn next_message(peer: &Peer) -> Option<Vec<u8>> {
     }
 }
 
-/// Ticks of a second in `/proc`, on every Linux of x86 and ARM.
-const USER_HZ: f64 = 100.0;
-
-/// Seconds of a processor that a process has used.
-fn used_s(process: u32) -> f64 {
-    let stat = fs::read_to_string(format!("/proc/{process}/stat")).unwrap();
-    let fields: Vec<_> = stat.rsplit(')').next().unwrap().split_whitespace().collect();
-    // utime and stime, the 14th and 15th of all fields.
-    let ticks: f64 = fields[11..13].iter().map(|ticks| ticks.parse::<f64>().unwrap()).sum();
-    ticks / USER_HZ
-}
-
 #[test]
 fn a_bus_that_stands_still_holds_native_messages_of_the_transport_protocol_and_loses_none() {
     let (scene, host, peer) = Scene::with_bus();
@@ -140,9 +129,10 @@ fn a_bus_that_stands_still_holds_native_messages_of_the_transport_protocol_and_l
     wait_until("the messages to be written", || running.stdout().contains("written"));
     assert!(running.stdout().contains("refused with ENOBUFS"), "{}", running.stdout());
     // It waits for the bus and does not ask it again and again.
-    let (began, used_before_s) = (Instant::now(), used_s(running.number()));
+    let used_s = || ProcessStat::of(running.number()).expect("it runs").used_s;
+    let (began, used_before_s) = (Instant::now(), used_s());
     std::thread::sleep(Duration::from_millis(500));
-    let (used_now_s, passed_s) = (used_s(running.number()) - used_before_s, began.elapsed().as_secs_f64());
+    let (used_now_s, passed_s) = (used_s() - used_before_s, began.elapsed().as_secs_f64());
     assert!(used_now_s < 0.1 * passed_s, "{used_now_s} s of a processor in {passed_s} s");
     host.signal(Signal::CONT);
     let expected = |number: u8| vec![number; if number.is_multiple_of(3) { 8 } else { 16 }];
@@ -223,12 +213,8 @@ fn a_program_ends_with_a_bench_can_that_is_killed_and_its_children_get_enosys() 
     wait_until("the child", || running.stdout().contains("waits"));
     let said = running.stdout();
     let shell = said.lines().find_map(|line| line.strip_prefix("shell ")).expect("the shell's number");
-    let state = format!("/proc/{shell}/stat");
-    let is_alive = || {
-        let stat = fs::read_to_string(&state).unwrap_or_default();
-        // One that has ended and that nobody has waited for is a zombie.
-        stat.rsplit(')').next().is_some_and(|rest| !rest.is_empty() && !rest.starts_with(" Z"))
-    };
+    let shell = shell.parse().expect("a number");
+    let is_alive = || ProcessStat::is_alive(shell);
     assert!(is_alive(), "{said}");
     assert_eq!(running.kill().signal, Some(9));
     wait_until("the shell's end", || !is_alive());
