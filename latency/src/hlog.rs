@@ -11,12 +11,10 @@ use super::samples::Samples;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use hdrhistogram::Histogram;
-use hdrhistogram::serialization::interval_log::{
-    IntervalLogIterator, IntervalLogWriterBuilder, IntervalLogWriterError, LogEntry, Tag,
-};
-use hdrhistogram::serialization::{Deserializer, V2DeflateSerializer};
+use hdrhistogram::serialization::Deserializer;
+use hdrhistogram::serialization::interval_log::{IntervalLogIterator, LogEntry};
 use std::io::{self, Write};
-use std::time::{Duration, SystemTime};
+use std::time::Duration;
 
 /// A histogram of a stretch of time.
 #[derive(Clone, Debug)]
@@ -108,34 +106,17 @@ pub fn write<'a>(
     base_unix_s: f64,
     intervals: impl IntoIterator<Item = &'a Interval>,
 ) -> io::Result<()> {
-    let base = SystemTime::UNIX_EPOCH + seconds(base_unix_s)?;
-    let mut serializer = V2DeflateSerializer::new();
-    let mut log = IntervalLogWriterBuilder::new()
-        .add_comment("[Histogram log format version 1.3]")
-        .add_comment("[Values are nanoseconds]")
-        .with_start_time(base)
-        .with_base_time(base)
-        .begin_log_with(out, &mut serializer)?;
-    for Interval { tag, start_s, duration_s, samples } in intervals {
-        let named =
-            Tag::new(tag).filter(|tag| !tag.is_empty()).ok_or_else(|| invalid(format!("tag {tag:?}")))?;
-        let (start, length) = (seconds(*start_s)?, seconds(*duration_s)?);
-        log.write_histogram(samples.histogram(), start, length, Some(named)).map_err(
-            |error| match error {
-                IntervalLogWriterError::IoError(error) => error,
-                IntervalLogWriterError::SerializeError(error) => io::Error::other(error),
-            },
-        )?;
-    }
-    Ok(())
+    let tagged = intervals.into_iter().map(|Interval { tag, start_s, duration_s, samples }| {
+        let when = (seconds(*start_s)?, seconds(*duration_s)?);
+        Ok((tag.as_str(), samples.histogram(), when))
+    });
+    let tagged = tagged.collect::<io::Result<Vec<_>>>()?;
+    realtime::write_intervals(out, base_unix_s, tagged)
 }
 
 fn seconds(seconds: f64) -> io::Result<Duration> {
-    Duration::try_from_secs_f64(seconds).map_err(|error| invalid(format!("{seconds} s: {error}")))
-}
-
-fn invalid(message: String) -> io::Error {
-    io::Error::new(io::ErrorKind::InvalidInput, message)
+    let invalid = |error| io::Error::new(io::ErrorKind::InvalidInput, format!("{seconds} s: {error}"));
+    Duration::try_from_secs_f64(seconds).map_err(invalid)
 }
 
 #[cfg(test)]

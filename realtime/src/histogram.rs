@@ -172,17 +172,31 @@ pub fn write_hlog(
     started_unix_s: f64,
     duration: Duration,
 ) -> io::Result<()> {
-    let started = start_of_log(started_unix_s)?;
-    let tagged = parts.iter().map(|&(name, histogram)| Ok((tag(name)?, histogram)));
-    let tagged = tagged.collect::<io::Result<Vec<_>>>()?;
-
+    // Checked before there is a file.
+    start_of_log(started_unix_s)?;
+    parts.iter().try_for_each(|(name, _)| tag(name).map(drop))?;
     let mut file = BufWriter::new(File::create(path)?);
-    let mut serializer = DeflateSerializer::new();
-    write_head(&mut file, started)?;
-    for (tag, histogram) in tagged {
-        write_interval(&mut file, &mut serializer, tag, histogram, (Duration::ZERO, duration))?;
-    }
+    let intervals = parts.iter().map(|&(tag, histogram)| (tag, histogram, (Duration::ZERO, duration)));
+    write_intervals(&mut file, started_unix_s, intervals)?;
     file.flush()
+}
+
+/// Writes a log of several intervals in the order given: tag, histogram, and when it began after the base time and how long it
+/// was. The base time is in seconds since 1970.
+///
+/// # Errors
+/// As [`write_hlog`].
+pub fn write_intervals<'a>(
+    out: &mut impl Write,
+    base_unix_s: f64,
+    intervals: impl IntoIterator<Item = (&'a str, &'a Histogram<u64>, (Duration, Duration))>,
+) -> io::Result<()> {
+    let mut serializer = DeflateSerializer::new();
+    write_head(out, start_of_log(base_unix_s)?)?;
+    for (name, histogram, when) in intervals {
+        write_interval(out, &mut serializer, tag(name)?, histogram, when)?;
+    }
+    Ok(())
 }
 
 /// The start of a log as a length of time since 1970.

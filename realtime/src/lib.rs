@@ -66,7 +66,7 @@ pub mod wall_clock;
 pub use arrivals::{ArrivalFigures, Arrivals};
 pub use clock::{Clock, Instant, MonotonicClock, VirtualClock};
 pub use flight::{FlightRecorder, Lateness, Severity, Stamped, Trigger};
-pub use histogram::{Percentiles, Recorder, write_hlog};
+pub use histogram::{Percentiles, Recorder, write_hlog, write_intervals};
 pub use interval_log::IntervalLog;
 pub use machine::Machine;
 pub use periodic::{
