@@ -17,9 +17,9 @@ pub const REMOTE_FLAG: u32 = 0x4000_0000;
 /// Flag of an error frame.
 pub const ERROR_FLAG: u32 = 0x2000_0000;
 /// Bits of an 11-bit identifier.
-const STANDARD_MASK: u32 = 0x7FF;
+pub const STANDARD_MASK: u32 = 0x7FF;
 /// Bits of a 29-bit identifier, and of an error frame's class.
-const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
+pub const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
 
 /// A classic CAN frame: identifier with the kernel's flags, and 0 to 8 bytes of data.
 #[derive(Clone, Copy, PartialEq, Eq)]

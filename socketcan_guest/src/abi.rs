@@ -4,7 +4,7 @@
 //!
 //! Source: Linux `include/uapi/linux/can.h`, `can/raw.h`, `can/bcm.h`, `if.h`, `if_arp.h`, `sockios.h`.
 
-use protocol::can::CAN_FRAME_BYTES;
+use protocol::can::{CAN_FRAME_BYTES, ERROR_FLAG};
 
 pub(crate) const AF_CAN: i32 = 29;
 /// Offset of the data in a frame.
@@ -26,15 +26,8 @@ pub(crate) const CAN_ISOTP: i32 = 6;
 /// One more than the largest protocol of the kernel's table.
 pub(crate) const CAN_PROTOCOLS: i32 = 8;
 
-/// Flags of an identifier.
-pub(crate) const EXTENDED_FLAG: u32 = 0x8000_0000;
-pub(crate) const REMOTE_FLAG: u32 = 0x4000_0000;
-pub(crate) const ERROR_FLAG: u32 = 0x2000_0000;
 /// Inverts a filter; in a filter the bit of error frames has this meaning.
 pub(crate) const INVERTED_FLAG: u32 = ERROR_FLAG;
-pub(crate) const STANDARD_MASK: u32 = 0x7FF;
-/// Bits of an error frame's class.
-pub(crate) const ERROR_MASK: u32 = 0x1FFF_FFFF;
 
 /// Bytes of `struct sockaddr_can` that the kernel requires and returns: family, two of padding, index of the interface.
 pub(crate) const ADDRESS_BYTES: usize = 8;

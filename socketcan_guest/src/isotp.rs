@@ -22,8 +22,9 @@ mod receiver;
 mod sender;
 mod settings;
 
-use crate::abi::{self, CAN_FRAME_DATA_AT, EXTENDED_FLAG, REMOTE_FLAG, STANDARD_MASK, frame, identifier};
+use crate::abi::{self, CAN_FRAME_DATA_AT, frame, identifier};
 use crate::bus_peer::FrameBytes;
+use protocol::can::{ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK, REMOTE_FLAG, STANDARD_MASK};
 use receiver::Receiver;
 use rustix::io::Errno;
 pub(crate) use sender::Progress;
@@ -39,8 +40,6 @@ const DATA_BYTES: usize = 8;
 const PEER_TIMEOUT: Duration = Duration::from_secs(1);
 /// `ISOTP_ECHO_TIMEOUT`: longest wait for the interface to accept a frame.
 const INTERFACE_TIMEOUT: Duration = Duration::from_secs(2);
-
-const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
 
 /// Kinds of frames: the high half of the byte after the extended address.
 mod kind {
@@ -184,7 +183,7 @@ impl IsoTp {
             return;
         };
         let low = if received & EXTENDED_FLAG != 0 { EXTENDED_MASK } else { STANDARD_MASK };
-        let mask = low | EXTENDED_FLAG | REMOTE_FLAG | abi::ERROR_FLAG;
+        let mask = low | EXTENDED_FLAG | REMOTE_FLAG | ERROR_FLAG;
         let data = &frame[CAN_FRAME_DATA_AT..];
         let at = self.settings.address_bytes();
         if identifier(frame) & mask != received || at == 1 && data[0] != self.settings.received_address {

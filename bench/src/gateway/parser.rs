@@ -15,7 +15,7 @@
 //! Source: socketcand, `doc/protocol.md`; python-can 4, `interfaces/socketcand`; SavvyCAN, `socketcand.cpp`.
 
 use protocol::bus::LONGEST_NAME;
-use protocol::can::{CanFrame, EXTENDED_FLAG};
+use protocol::can::{CanFrame, EXTENDED_FLAG, EXTENDED_MASK, STANDARD_MASK};
 
 /// Longest request in bytes without brackets: twice the longest valid one.
 pub(super) const LONGEST_REQUEST: usize = 128;
@@ -127,15 +127,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<Request, Refusal> {
 
 /// Parses ID LEN BYTE….
 fn frame<'a>(words: &mut impl Iterator<Item = &'a str>) -> Option<CanFrame> {
-    const LARGEST_EXTENDED: u32 = 0x1FFF_FFFF;
-    const LARGEST_STANDARD: u32 = 0x7FF;
     let digits = words.next()?;
     let number = hexadecimal(digits, 8)?;
     let id = number & !EXTENDED_FLAG;
-    if id > LARGEST_EXTENDED {
+    if id > EXTENDED_MASK {
         return None;
     }
-    let extended = number != id || digits.len() == 8 || id > LARGEST_STANDARD;
+    let extended = number != id || digits.len() == 8 || id > STANDARD_MASK;
     let length = hexadecimal(words.next()?, 1).filter(|length| *length <= 8)? as usize;
     let mut data = [0; 8];
     for byte in &mut data[..length] {

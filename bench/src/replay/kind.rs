@@ -8,7 +8,7 @@
 //!
 //! An error frame is a report of an interface to its host; it cannot be sent.
 
-use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG};
+use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK};
 use protocol::frames::MessageSpec;
 use std::str::FromStr;
 
@@ -59,7 +59,7 @@ impl Exclusion {
         match self {
             Self::Commands => Kind::of(frame) == Kind::Command,
             Self::Rig => Kind::of(frame) == Kind::Rig,
-            Self::Identifier(id) => frame.raw_id() & (EXTENDED_FLAG | 0x1FFF_FFFF) == id,
+            Self::Identifier(id) => frame.raw_id() & (EXTENDED_FLAG | EXTENDED_MASK) == id,
         }
     }
 }

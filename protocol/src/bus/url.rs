@@ -4,7 +4,7 @@
 //! only connects carries them without effect. Without `bitrate` the wire takes no time, and has no errors.
 
 use super::host_report::FramesById;
-use crate::can::EXTENDED_FLAG;
+use crate::can::{EXTENDED_FLAG, EXTENDED_MASK, STANDARD_MASK};
 use crate::wire_time::{FASTEST_BITS_PER_S, SLOWEST_BITS_PER_S, WireTiming};
 use std::ffi::OsString;
 use std::fmt;
@@ -182,7 +182,7 @@ fn take_timing(timing: &mut WireTiming, key: &str, value: &str) -> Option<()> {
 /// An identifier as candump writes it: eight digits for 29 bits.
 fn identifier(value: &str) -> Option<u32> {
     let id = u32::from_str_radix(value, 16).ok()?;
-    let (most, flag) = if value.len() == 8 { (0x1FFF_FFFF, EXTENDED_FLAG) } else { (0x7FF, 0) };
+    let (most, flag) = if value.len() == 8 { (EXTENDED_MASK, EXTENDED_FLAG) } else { (STANDARD_MASK, 0) };
     (id <= most).then_some(id | flag)
 }
 
@@ -200,7 +200,7 @@ impl fmt::Display for WireOptions {
                 let id = if id & EXTENDED_FLAG == 0 {
                     FramesById::name_of(id)
                 } else {
-                    format!("{:08X}", id & 0x1FFF_FFFF)
+                    format!("{:08X}", id & EXTENDED_MASK)
                 };
                 options.push(format!("errors_id={id}"));
             }

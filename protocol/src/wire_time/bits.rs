@@ -14,7 +14,7 @@
 //!
 //! Source: ISO 11898-1, frame formats, bit stuffing, CRC-15.
 
-use crate::can::{CanFrame, EXTENDED_FLAG, REMOTE_FLAG};
+use crate::can::{CanFrame, EXTENDED_FLAG, REMOTE_FLAG, STANDARD_MASK};
 use crc::{CRC_15_CAN, Crc};
 
 /// Bits after the CRC, which are not stuffed: CRC delimiter, acknowledgement 2, end of frame 7, intermission 3.
@@ -104,9 +104,9 @@ pub fn arbitration_rank(frame: &CanFrame) -> u32 {
     let raw_id = frame.raw_id();
     let remote = u32::from(raw_id & REMOTE_FLAG != 0);
     if raw_id & EXTENDED_FLAG == 0 {
-        return (raw_id & 0x7FF) << 21 | remote << 20;
+        return (raw_id & STANDARD_MASK) << 21 | remote << 20;
     }
-    let (base, rest) = (raw_id >> 18 & 0x7FF, raw_id & 0x3_FFFF);
+    let (base, rest) = (raw_id >> 18 & STANDARD_MASK, raw_id & 0x3_FFFF);
     base << 21 | 0b11 << 19 | rest << 1 | remote
 }
 

@@ -5,8 +5,9 @@
 
 use super::Action;
 use super::message::{Head, flag, opcode};
-use crate::abi::{EXTENDED_FLAG, REMOTE_FLAG, identifier, u64_at};
+use crate::abi::{identifier, u64_at};
 use crate::bus_peer::FrameBytes;
+use protocol::can::{EXTENDED_FLAG, REMOTE_FLAG};
 use rustix::io::Errno;
 use std::time::Instant;
 

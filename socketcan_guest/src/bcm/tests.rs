@@ -188,7 +188,7 @@ fn a_remote_request_is_answered_with_the_frame_of_the_job() {
     assert_eq!(bench.frame(frame(id, &[])), [Action::Send(INTERFACE, frame(0x123, &[9]))]);
 }
 
-const REMOTE: u32 = crate::abi::REMOTE_FLAG;
+const REMOTE: u32 = protocol::can::REMOTE_FLAG;
 
 #[test]
 fn malformed_commands_are_refused_as_the_kernel_does() {
