@@ -26,7 +26,7 @@ use crate::chamber::{Air, Chambers, FlowLag};
 use crate::faults::Faults;
 use crate::lanes::{Axes, Choice, Mask, Pair};
 use crate::linkage::{ContactKinematics, Linkage};
-use crate::motion::{Motion, MotionSpan, Place};
+use crate::motion::{Motion, MotionSpan, PistonState};
 use crate::parameters::RigParameters;
 use crate::state::{AxisState, State};
 use crate::supply::{Supply, SupplyDecay};
@@ -254,8 +254,8 @@ impl Integrator {
             }
         }
         let force = forces.pneumatic + forces.external + forces.contact;
-        let mut place = |axis: usize| laws.advance(step, &middle, extra_state, axis, force.to_array()[axis]);
-        let (drive, load) = (place(0), place(1));
+        let mut piston = |axis: usize| laws.advance(step, &middle, extra_state, axis, force.to_array()[axis]);
+        let (drive, load) = (piston(0), piston(1));
         let extension = Pair::new(drive.extension, load.extension);
         let velocity = Pair::new(drive.velocity, load.velocity);
         let limits = self.chambers.limits(node.end_pa);
@@ -341,8 +341,8 @@ impl<P: Axes> Lanes<P> {
 
     /// One axis.
     #[inline(always)]
-    pub(crate) fn place(&self, axis: usize) -> Place {
-        Place { extension: self.extension.to_array()[axis], velocity: self.velocity.to_array()[axis] }
+    pub(crate) fn piston(&self, axis: usize) -> PistonState {
+        PistonState { extension: self.extension.to_array()[axis], velocity: self.velocity.to_array()[axis] }
     }
 
     /// With no flow left in the chambers while the check valves are shut.

@@ -60,9 +60,9 @@ pub(crate) struct MotionSpan<P = Pair> {
     pub(crate) push: P,
 }
 
-/// Where an axis is and how fast, in its own extension, m and m/s.
+/// Extension of an axis and its velocity, m and m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct PistonState {
     pub(crate) extension: f64,
     pub(crate) velocity: f64,
 }
@@ -140,49 +140,49 @@ impl Motion {
     pub(crate) fn advance(
         &self,
         axis: usize,
-        from: Place,
+        from: PistonState,
         force: f64,
         levels: &Levels,
         span_s: f64,
-    ) -> Place {
+    ) -> PistonState {
         let mass = self.masses_kg[axis];
-        let mut place = from;
+        let mut piston = from;
         let mut left_s = span_s;
         // A held force turns the motion around at most once, so two legs do; the third is for rounding.
         for _ in 0..3 {
-            let direction = if place.velocity != 0.0 {
-                place.velocity.signum()
-            } else if self.holds(place.extension, force, levels.break_away_n[side(force)]) {
-                return place;
+            let direction = if piston.velocity != 0.0 {
+                piston.velocity.signum()
+            } else if self.holds(piston.extension, force, levels.break_away_n[side(force)]) {
+                return piston;
             } else {
                 force.signum()
             };
             let viscous = levels.viscous_n_s_per_m[side(direction)];
             let driving = force - direction * levels.sliding_n[side(direction)];
-            let next = Factors::new(mass, viscous, left_s).advance(place, driving);
+            let next = Factors::new(mass, viscous, left_s).advance(piston, driving);
             if next.velocity * direction > 0.0 {
                 return self.stop_at_ends(next);
             }
-            if place.velocity == 0.0 {
+            if piston.velocity == 0.0 {
                 // Less than a rounding of way: the force exceeds the friction by nothing that moves a number.
-                return place;
+                return piston;
             }
-            let stop_s = zero_crossing(mass, viscous, place.velocity, driving).min(left_s);
-            let stop = Factors::new(mass, viscous, stop_s).advance(place, driving);
-            place = self.stop_at_ends(Place { extension: stop.extension, velocity: 0.0 });
+            let stop_s = zero_crossing(mass, viscous, piston.velocity, driving).min(left_s);
+            let stop = Factors::new(mass, viscous, stop_s).advance(piston, driving);
+            piston = self.stop_at_ends(PistonState { extension: stop.extension, velocity: 0.0 });
             left_s -= stop_s;
         }
-        place
+        piston
     }
 
     /// At an end of the stroke the piston stops dead.
-    pub(crate) fn stop_at_ends(&self, place: Place) -> Place {
-        if place.extension < 0.0 {
-            Place { extension: 0.0, velocity: 0.0 }
-        } else if place.extension > self.stroke_m {
-            Place { extension: self.stroke_m, velocity: 0.0 }
+    pub(crate) fn stop_at_ends(&self, piston: PistonState) -> PistonState {
+        if piston.extension < 0.0 {
+            PistonState { extension: 0.0, velocity: 0.0 }
+        } else if piston.extension > self.stroke_m {
+            PistonState { extension: self.stroke_m, velocity: 0.0 }
         } else {
-            place
+            piston
         }
     }
 }
@@ -235,8 +235,8 @@ impl Factors {
         }
     }
 
-    fn advance(&self, from: Place, force: f64) -> Place {
-        Place {
+    fn advance(&self, from: PistonState, force: f64) -> PistonState {
+        PistonState {
             extension: from.extension + self.drift * from.velocity + self.push * force,
             velocity: self.keep * from.velocity + self.gain * force,
         }
@@ -274,13 +274,19 @@ mod tests {
         Motion::new(&rig, [0.0; 2])
     }
 
-    fn advance(viscous_n_per_mm_per_s: f64, axis: usize, from: Place, force: f64, span_s: f64) -> Place {
+    fn advance(
+        viscous_n_per_mm_per_s: f64,
+        axis: usize,
+        from: PistonState,
+        force: f64,
+        span_s: f64,
+    ) -> PistonState {
         let motion = motion(viscous_n_per_mm_per_s);
         motion.advance(axis, from, force, &motion.levels, span_s)
     }
 
-    fn at(velocity: f64) -> Place {
-        Place { extension: 0.25, velocity }
+    fn at(velocity: f64) -> PistonState {
+        PistonState { extension: 0.25, velocity }
     }
 
     #[test]
@@ -333,8 +339,8 @@ mod tests {
 
     #[test]
     fn an_end_of_the_stroke_stops_the_piston_dead() {
-        let stop = advance(1.1, 1, Place { extension: 0.4999, velocity: 1.0 }, 500.0, 1e-3);
-        assert_eq!(stop, Place { extension: 0.5, velocity: 0.0 });
+        let stop = advance(1.1, 1, PistonState { extension: 0.4999, velocity: 1.0 }, 500.0, 1e-3);
+        assert_eq!(stop, PistonState { extension: 0.5, velocity: 0.0 });
         assert_eq!(advance(1.1, 1, stop, 1e6, 1e-3), stop, "pressed");
         assert_eq!(advance(1.1, 1, stop, -34.0, 1e-3), stop, "held");
         assert!(advance(1.1, 1, stop, -36.0, 1e-3).extension < 0.5, "leaves");

@@ -264,27 +264,27 @@ impl TrueForces {
         let pneumatic = integrator.chambers.pneumatic_force(air.pressure[0], air.pressure[1]).to_array();
 
         let axis = |i: usize| {
-            let place = lanes.place(i);
+            let piston = lanes.piston(i);
             let hand_n = hand.to_array()[i];
             let effect_n =
                 effects.map_or(0.0, |effects| effects.force(i, &AxisConditions::at(lanes, &air, i)).sum(0.0));
             let force = pneumatic[i] + hand_n + contact_n + effect_n;
-            let friction = effects.map(|effects| Friction::at(effects, integrator, i, place, &air));
-            let levels = friction.map_or(motion.levels, |friction| friction.levels(place.velocity.abs()));
-            let viscous_n = -(levels.viscous_n_s_per_m[side(place.velocity)] * place.velocity);
+            let friction = effects.map(|effects| Friction::at(effects, integrator, i, piston, &air));
+            let levels = friction.map_or(motion.levels, |friction| friction.levels(piston.velocity.abs()));
+            let viscous_n = -(levels.viscous_n_s_per_m[side(piston.velocity)] * piston.velocity);
             let mut sliding_n = 0.0;
             let mut holding_n = 0.0;
-            let bristles = friction.and_then(|friction| friction.bristles(place, force));
+            let bristles = friction.and_then(|friction| friction.bristles(piston, force));
             if let Some(bristles) = bristles {
                 sliding_n = bristles.sum(0.0);
                 // What the bristles leave of a force that presses against an end, the end takes.
                 let rest = force + sliding_n;
-                if place.velocity == 0.0 && motion.pressed(place.extension, rest) {
+                if piston.velocity == 0.0 && motion.pressed(piston.extension, rest) {
                     holding_n = -rest;
                 }
-            } else if place.velocity != 0.0 {
-                sliding_n = -levels.sliding_n[side(place.velocity)] * place.velocity.signum();
-            } else if motion.holds(place.extension, force, levels.break_away_n[side(force)]) {
+            } else if piston.velocity != 0.0 {
+                sliding_n = -levels.sliding_n[side(piston.velocity)] * piston.velocity.signum();
+            } else if motion.holds(piston.extension, force, levels.break_away_n[side(force)]) {
                 holding_n = -force;
             } else {
                 sliding_n = -levels.sliding_n[side(force)] * force.signum();

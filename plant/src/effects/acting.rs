@@ -18,7 +18,7 @@ use crate::faults::{Faults, Outlet};
 use crate::integrator::laws::{Baseline, Laws, StepContext};
 use crate::integrator::{HeldInputs, Integrator, Lanes, MidpointAir};
 use crate::lanes::{Axes, Choice, Mask, Pair};
-use crate::motion::{MotionSpan, Place, side};
+use crate::motion::{MotionSpan, PistonState, side};
 use crate::parameters::{LinkageParameters, RigParameters};
 use crate::state::State;
 use crate::truth::TrueForces;
@@ -374,7 +374,7 @@ impl Laws for Effects {
         }
         let friction = self.friction(step.of, axis, middle, &self.memory.states.axes[axis]);
         let break_away_n = friction.break_away_n(direction_of(force));
-        step.of.motion.holds(step.from.place(axis).extension, force, break_away_n)
+        step.of.motion.holds(step.from.piston(axis).extension, force, break_away_n)
     }
 
     fn advance(
@@ -384,11 +384,11 @@ impl Laws for Effects {
         states: &mut EffectStates,
         axis: usize,
         force: f64,
-    ) -> Place {
+    ) -> PistonState {
         if self.baseline_friction {
             return Baseline.advance(step, middle, &mut (), axis, force);
         }
-        let (of, start) = (step.of, step.from.place(axis));
+        let (of, start) = (step.of, step.from.piston(axis));
         let axis_states = &mut states.axes[axis];
         let friction = self.friction(of, axis, middle, axis_states);
         let span_s = step.span.span_s;
@@ -401,8 +401,10 @@ impl Laws for Effects {
         let bristle_load = friction.bristle_load(start.velocity, speed, force);
         let (way_m, bristle) = effect.advance(bristle, bristle_load, span_s);
         axis_states.deflection_m = bristle.deflection_m;
-        of.motion
-            .stop_at_ends(Place { extension: start.extension + way_m, velocity: bristle.velocity_m_per_s })
+        of.motion.stop_at_ends(PistonState {
+            extension: start.extension + way_m,
+            velocity: bristle.velocity_m_per_s,
+        })
     }
 
     fn air(&self, step: StepContext<'_>, to: &mut Lanes, middle: &MidpointAir, states: &mut EffectStates) {

@@ -7,7 +7,7 @@ use super::presliding::{Bristle, BristleLoad};
 use super::sums::{BreakAwayLevel, Bristles, SlidingLevel, Viscous};
 use crate::integrator::{Integrator, MidpointAir};
 use crate::lanes::Axes;
-use crate::motion::{Levels, Place, side};
+use crate::motion::{Levels, PistonState, side};
 use crate::truth::AirState;
 
 /// Values that the friction levels depend on, besides the speed.
@@ -75,11 +75,11 @@ impl<'a> Friction<'a> {
         effects: &'a Effects,
         of: &'a Integrator,
         axis: usize,
-        place: Place,
+        piston: PistonState,
         air: &AirState,
     ) -> Self {
         let conditions = FrictionConditions {
-            extension_m: place.extension,
+            extension_m: piston.extension,
             gauge_pa: air.of_axis_pa(axis).map(|pa| pa - of.atmospheric_pa),
             rest_s: effects.memory.states.axes[axis].rest_s,
         };
@@ -154,11 +154,11 @@ impl<'a> Friction<'a> {
     }
 
     /// Friction of the bristles, along the axis's extension; `None` for an axis without them.
-    pub(crate) fn bristles(&self, place: Place, force_n: f64) -> Option<Bristles> {
+    pub(crate) fn bristles(&self, piston: PistonState, force_n: f64) -> Option<Bristles> {
         let effect = self.effects.on[self.axis].presliding?;
         let deflection_m = self.effects.memory.states.axes[self.axis].deflection_m;
-        let bristle = Bristle { velocity_m_per_s: place.velocity, deflection_m };
-        let bristle_load = self.bristle_load(place.velocity, place.velocity.abs(), force_n);
+        let bristle = Bristle { velocity_m_per_s: piston.velocity, deflection_m };
+        let bristle_load = self.bristle_load(piston.velocity, piston.velocity.abs(), force_n);
         Some(Bristles { presliding: effect.force(bristle, bristle_load) })
     }
 

@@ -227,10 +227,10 @@ pub(crate) struct AxisConditions {
 impl AxisConditions {
     /// At the instant of a state.
     pub(crate) fn at(lanes: &Lanes, air: &AirState, axis: usize) -> Self {
-        let place = lanes.place(axis);
+        let piston = lanes.piston(axis);
         AxisConditions {
-            extension_m: place.extension,
-            velocity_m_per_s: place.velocity,
+            extension_m: piston.extension,
+            velocity_m_per_s: piston.velocity,
             spool: lanes.spool.to_array()[axis],
             pressure_pa: air.of_axis_pa(axis),
         }

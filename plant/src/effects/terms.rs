@@ -117,7 +117,7 @@ impl Effects {
             let mut visitor = TermVisitor { effects: self, part, visit };
             let axis_states = &self.memory.states.axes[axis];
             let lane = |pair: Pair| pair.to_array()[axis];
-            let place = lanes.place(axis);
+            let piston = lanes.piston(axis);
 
             // From the command to the flows.
             let command = if state.emergency_stop { 0.0 } else { inputs.valve[axis] };
@@ -165,7 +165,7 @@ impl Effects {
                 let mut rate = self.air_rate(of, axis, chamber, heat, 0.0);
                 let area_m2 = [1.0, -1.0][chamber] * of.chambers.areas_m2()[chamber];
                 rate.heat_exchange -=
-                    self.work_share(axis) * air.of_axis_pa(axis)[chamber] * area_m2 * place.velocity;
+                    self.work_share(axis) * air.of_axis_pa(axis)[chamber] * area_m2 * piston.velocity;
                 visitor.balance(&rate, at, element);
                 let file = of.file_dead_volume_m3;
                 let dead_volume = self.on[axis].dead_volume.map_or(0.0, |effect| effect.term(file));
@@ -173,22 +173,22 @@ impl Effects {
             }
 
             // Friction in the direction of the motion, or of the force on a resting piston.
-            let friction = Friction::at(self, of, axis, place, &air);
+            let friction = Friction::at(self, of, axis, piston, &air);
             let force = forces.unresisted_n(axis);
-            let direction = direction_of(if place.velocity == 0.0 { force } else { place.velocity });
-            let (at, speed) = (&friction.conditions, place.velocity.abs());
+            let direction = direction_of(if piston.velocity == 0.0 { force } else { piston.velocity });
+            let (at, speed) = (&friction.conditions, piston.velocity.abs());
             let sliding = friction.sliding_level(speed, direction);
             let open = OpenBalance::SlidingLevel { at, speed_m_per_s: speed, direction };
             visitor.open(&sliding, None, &open);
             let open = OpenBalance::BreakAwayLevel { at, direction };
             visitor.open(&friction.break_away_level(direction, &sliding), None, &open);
             visitor.balance(&self.viscous_term(of, axis, direction), None, None);
-            let bristles = friction.bristles(place, force).unwrap_or_default();
+            let bristles = friction.bristles(piston, force).unwrap_or_default();
             visitor.balance(&bristles, None, None);
             visitor.open(&self.force(axis, &conditions), None, &OpenBalance::Force(&conditions));
 
             // What the sensors make of it.
-            let position_m = if axis == 0 { place.extension } else { of.motion.stroke_m - place.extension };
+            let position_m = if axis == 0 { piston.extension } else { of.motion.stroke_m - piston.extension };
             let force_n = forces.sensor_n(of, axis);
             let declared = self.declared_at(axis, &conditions, force_n);
             let open = OpenBalance::PositionReading { truth_m: position_m };

@@ -7,7 +7,7 @@
 use super::{HeldInputs, Integrator, Lanes, MidpointAir, Node, Span};
 use crate::chamber::Air;
 use crate::lanes::{Axes, Pair};
-use crate::motion::{MotionSpan, Place, against};
+use crate::motion::{MotionSpan, PistonState, against};
 use crate::valve::edge_flow;
 
 /// All that a step depends on: integrator, length, start state, supply and held inputs.
@@ -119,7 +119,7 @@ pub(crate) trait Laws<P: Axes = Pair> {
         extra_state: &mut Self::ExtraState,
         axis: usize,
         force: f64,
-    ) -> Place;
+    ) -> PistonState;
 
     /// The air of both chambers after a step, given what lag and bounds left of it.
     fn air(
@@ -194,7 +194,7 @@ impl<P: Axes> Laws<P> for Baseline {
 
     #[inline(always)]
     fn holds(&self, step: StepContext<'_, P>, _: &MidpointAir<P>, axis: usize, force: f64) -> bool {
-        step.of.motion.holds(step.from.place(axis).extension, force, step.of.motion.levels.break_away_n[0])
+        step.of.motion.holds(step.from.piston(axis).extension, force, step.of.motion.levels.break_away_n[0])
     }
 
     #[inline(always)]
@@ -205,9 +205,9 @@ impl<P: Axes> Laws<P> for Baseline {
         (): &mut (),
         axis: usize,
         force: f64,
-    ) -> Place {
+    ) -> PistonState {
         let motion = &step.of.motion;
-        motion.advance(axis, step.from.place(axis), force, &motion.levels, step.span.span_s)
+        motion.advance(axis, step.from.piston(axis), force, &motion.levels, step.span.span_s)
     }
 
     #[inline(always)]

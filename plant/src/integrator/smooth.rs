@@ -7,7 +7,7 @@ use super::{Forces, HeldInputs, Integrator, Lanes, Node, Span};
 use crate::chamber::Air;
 use crate::lanes::{Axes, Choice};
 use crate::linkage::ContactKinematics;
-use crate::motion::{MotionSpan, Place};
+use crate::motion::{MotionSpan, PistonState};
 
 /// A resting axis linked to a moving one is looked at closely from this far below its break-away force on, N: more than
 /// the contact force changes within half a substep while the other axis creeps.
@@ -81,16 +81,16 @@ impl<P: Axes> Integrator<P> {
         let mut sticks = None;
         if laws.on_bristles() != [false; 2] {
             let unresisted = forces.pneumatic + forces.external + forces.contact;
-            let place = |axis: usize, extra_state: &mut L::ExtraState| {
+            let piston = |axis: usize, extra_state: &mut L::ExtraState| {
                 if !laws.on_bristles()[axis] {
-                    return Place {
+                    return PistonState {
                         extension: extension.to_array()[axis],
                         velocity: velocity.to_array()[axis],
                     };
                 }
                 laws.advance(step, &middle, extra_state, axis, unresisted.to_array()[axis])
             };
-            let (drive, load) = (place(0, extra_state), place(1, extra_state));
+            let (drive, load) = (piston(0, extra_state), piston(1, extra_state));
             extension = P::new(drive.extension, load.extension);
             velocity = P::new(drive.velocity, load.velocity);
             sticks = Some(P::Mask::new(laws.on_bristles().map(|on| !on)));
