@@ -139,6 +139,20 @@ fn every_file_of_tests_belongs_to_an_executable() {
     assert!(complaints.is_empty(), "{}", complaints.join("\n"));
 }
 
+/// No figure of CI would show it: instructions are counted of the plant's period alone.
+#[test]
+fn every_crate_that_a_cycle_calls_is_compiled_for_speed() {
+    let manifest = fs::read_to_string(workspace().join("Cargo.toml")).expect("the workspace's manifest");
+    let ours =
+        ["algorithms", "axis-control", "controller", "emulator", "plant", "plugin", "protocol", "realtime"];
+    let others =
+        ["crc", "crossbeam-channel", "crossbeam-utils", "hdrhistogram", "libm", "rustix", "socketcan"];
+    for name in ours.iter().chain(&["rig-node", "runlog", "xcp"]).chain(&others) {
+        let level = format!("[profile.release.package.{name}]\nopt-level = 3\n");
+        assert!(manifest.contains(&level), "{name} runs in each cycle: give it opt-level 3 in Cargo.toml");
+    }
+}
+
 #[test]
 fn every_mutant_of_the_list_applies() {
     let read = |path: &str| {
