@@ -17,9 +17,9 @@ mod record;
 mod slow;
 mod work;
 
-pub use changes::PlannedChange;
+pub(crate) use changes::PlannedChange;
 pub use record::{Answer, AxisRecord, NumberColumn, StateColumn};
-pub use work::{ForcePlan, Plan};
+pub(crate) use work::{ForcePlan, Plan};
 
 use crate::chains::leading::{SupervisoryChains, SupervisoryInputs};
 use crate::chains::main::{AxisMeasurement, MainCause, MainConfig, MainOutput};
@@ -41,19 +41,22 @@ use received::Received;
 use slow::StatusSchedule;
 use work::{ControlRequest, CycleInputs, DemandGenerator};
 
-pub struct AxisParts {
-    pub axis: Axis,
-    pub program: Program,
-    pub plan: Plan,
-    pub main: MainConfig,
+/// Program, task and configuration of an axis, as its files give them.
+pub(crate) struct AxisParts {
+    pub(crate) axis: Axis,
+    pub(crate) program: Program,
+    pub(crate) plan: Plan,
+    pub(crate) main: MainConfig,
     /// Nominal supply pressure, absolute, Pa.
-    pub supply_pressure_pa: f64,
-    pub changes: Vec<PlannedChange>,
+    pub(crate) supply_pressure_pa: f64,
+    pub(crate) changes: Vec<PlannedChange>,
     /// A row of the record every so many cycles.
-    pub record_every: u64,
+    pub(crate) record_every: u64,
 }
 
+/// Controller of one axis: its chains and its program, and what they keep from cycle to cycle.
 pub struct AxisController {
+    /// Axis whose sensors it answers and whose valve it commands.
     pub axis: Axis,
     /// Its variables may be changed between two cycles.
     pub program: Program,
@@ -64,6 +67,7 @@ pub struct AxisController {
     changes: Changes,
     supply_pressure_pa: f64,
     record_every: u64,
+    /// Errors of the position control since the rig's time began; none on an axis under force control.
     pub figures: PositionFigures,
     average: Average,
     range: Range,
@@ -77,7 +81,8 @@ pub struct AxisController {
 }
 
 impl AxisController {
-    pub fn new(parts: AxisParts) -> Self {
+    /// A controller before its first cycle, its main chain waiting for the rig.
+    pub(crate) fn new(parts: AxisParts) -> Self {
         let AxisParts { axis, program, plan, main, supply_pressure_pa, changes, record_every } = parts;
         Self {
             axis,
@@ -145,7 +150,7 @@ impl AxisController {
     }
 
     /// The emergency stop to send in `cycle` when no sensors of this axis came for too long, which is a fault.
-    pub fn without_sensors(&mut self, cycle: u64) -> Option<EmergencyStop> {
+    pub(crate) fn without_sensors(&mut self, cycle: u64) -> Option<EmergencyStop> {
         self.fault = Some(Fault::SensorLoss);
         self.advance(cycle, None, None);
         self.program.shut();
@@ -257,23 +262,27 @@ impl AxisController {
         (self.rig, self.fault, self.algorithm_fault, self.request, self.alive) = (None, None, None, None, 0);
     }
 
-    /// Why the algorithm is no longer called.
+    /// Why the algorithm is no longer called; `None` again from the next initial positioning on.
     pub fn algorithm_fault(&self) -> Option<AlgorithmFault> {
         self.algorithm_fault
     }
 
+    /// State of the main chain since the last cycle; waiting for the rig before the first.
     pub fn state(&self) -> MainChainState {
         self.status().main_chain
     }
 
+    /// Why the main chain entered its state.
     pub fn cause(&self) -> MainCause {
         self.supervisory.main.entered.cause
     }
 
-    pub fn may_restart(&self) -> bool {
+    /// Whether the run can begin anew after an abort or a fault.
+    pub(crate) fn may_restart(&self) -> bool {
         self.main_config.after_emergency_stop != AfterStop::End
     }
 
+    /// State of the emergency stop chain; the valve is shut in all but ready.
     pub fn emergency_stop(&self) -> EmergencyStopChainState {
         self.supervisory.stop.state()
     }

@@ -19,10 +19,10 @@
 
 #[cfg(test)]
 mod duo;
-pub mod emergency_stop;
-pub mod fault;
+mod emergency_stop;
+mod fault;
 pub mod force;
-pub mod leading;
+pub(crate) mod leading;
 pub mod main;
 pub mod matching;
 pub mod settled;
@@ -35,37 +35,41 @@ use protocol::periods::CYCLE_S;
 
 /// Cycles after which a partner that is needed counts as lost: ten periods of its status. Those that the axis answered itself
 /// count: when the rig skips cycles, or this process is held up, the partner is not to blame.
-pub const PARTNER_LOST_CYCLES: u64 = 100;
+pub(crate) const PARTNER_LOST_CYCLES: u64 = 100;
 
+/// What was received of the other axis's controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Partner {
-    pub status: Option<ChainStatus>,
-    pub values: Option<ChainValues>,
+pub(crate) struct Partner {
+    pub(crate) status: Option<ChainStatus>,
+    pub(crate) values: Option<ChainValues>,
     /// Cycle in which its last status came.
-    pub received: Option<u64>,
+    pub(crate) received: Option<u64>,
 }
 
 impl Partner {
     /// The partner's status if it is not older than [`PARTNER_LOST_CYCLES`] at `cycle`.
     ///
     /// A status "from later" is of another rig's time and counts by its distance too.
-    pub fn fresh(&self, cycle: u64) -> Option<&ChainStatus> {
+    pub(crate) fn fresh(&self, cycle: u64) -> Option<&ChainStatus> {
         let received = self.received.filter(|received| cycle.abs_diff(*received) <= PARTNER_LOST_CYCLES);
         received.and(self.status.as_ref())
     }
 }
 
+/// Commands of the console since the last cycle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Console {
+pub(crate) struct Console {
     /// `RunControl` start of this experiment, or of any (number 0).
-    pub start: bool,
-    pub abort: bool,
-    pub release: bool,
+    pub(crate) start: bool,
+    /// `RunControl` abort, whatever its number.
+    pub(crate) abort: bool,
+    /// EmergencyStop frame of the console with release.
+    pub(crate) release: bool,
 }
 
 impl Console {
     /// Takes a `RunControl` frame; a start of another experiment than number `experiment` is not for this one.
-    pub fn take_run_control(&mut self, frame: &RunControl, experiment: u8) {
+    pub(crate) fn take_run_control(&mut self, frame: &RunControl, experiment: u8) {
         match frame.command {
             RunControlCommand::Start if [0, experiment].contains(&frame.experiment) => self.start = true,
             RunControlCommand::Abort => self.abort = true,
@@ -89,11 +93,12 @@ pub enum AfterStop {
     OnStart,
 }
 
+/// The state of a chain, and when and why it was entered.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StateEntry<State, Cause> {
-    pub cycle: u64,
-    pub state: State,
-    pub cause: Cause,
+pub(crate) struct StateEntry<State, Cause> {
+    pub(crate) cycle: u64,
+    pub(crate) state: State,
+    pub(crate) cause: Cause,
 }
 
 /// Seconds from cycle `since` to `cycle`; 0 when it lies ahead.

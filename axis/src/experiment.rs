@@ -34,9 +34,10 @@
 //!
 //! `[rig]` is the emulator's and `[passed]` the report's; they may hold what they like.
 
-pub mod axis;
+mod axis;
 
-pub use axis::{AxisExperiment, Change, OperatorLimits, Prepare, ProgramReference, SetPoints};
+pub use axis::{AxisExperiment, ProgramReference};
+pub(crate) use axis::{OperatorLimits, Prepare, SetPoints};
 
 use crate::chains::AfterStop;
 use crate::chains::main::Start;
@@ -44,35 +45,42 @@ use settings::parameters::Parameter;
 use settings::{Section, SettingsError, Source};
 use std::path::Path;
 
+/// An experiment file, read and checked.
 #[derive(Clone, Debug)]
 pub struct Experiment {
+    /// Name for people, in reports.
     pub title: String,
     /// A sentence about it; may be empty.
     pub about: String,
     /// Its name on the bus, 1 to 255.
     pub number: u8,
+    /// `[run]`, for both axes.
     pub run: RunSection,
     /// Experiment of the drive; `None`: its valve is held shut.
     pub drive: Option<AxisExperiment>,
     /// Experiment of the load axis; `None`: its valve is held shut.
     pub load: Option<AxisExperiment>,
     /// Cycles between two rows of an axis's file.
-    pub record_every_cycles: u32,
+    pub(crate) record_every_cycles: u32,
+    /// `[rig]`, unchecked: emulator and rehearsal read it, the controllers do not.
     pub rig: toml::Table,
+    /// `[passed]`, unchecked: bounds on figures of the run, each under the name of its figure.
     pub passed: toml::Table,
 }
 
+/// Repetitions, settling, start and restart of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunSection {
     /// How often it is driven through, each from initial positioning on.
     pub repetitions: u32,
     /// How long an axis must stand still before and after, s.
-    pub settling_s: f64,
-    /// How long a waiting state of the chains may take before it is given up, s.
-    pub settling_timeout_s: f64,
+    pub(crate) settling_s: f64,
+    /// How long a state of the main chain may take beyond its own length before it is given up, s.
+    pub(crate) settling_timeout_s: f64,
     /// Start condition once both axes have settled.
-    pub start: Start,
-    pub after_emergency_stop: AfterStop,
+    pub(crate) start: Start,
+    /// What follows once the rig has recovered; the command line may override it.
+    pub(crate) after_emergency_stop: AfterStop,
 }
 
 static NUMBER: Parameter = Parameter::new(("number", ""), [1.0, 255.0], 1.0, "name on the bus");

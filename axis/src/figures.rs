@@ -13,6 +13,7 @@ struct MaximumErrors {
     resting_m: Option<f64>,
 }
 
+/// Dynamic and static error of a position control, over the repetitions that were not cut off, the current one among them.
 #[derive(Debug, Default)]
 pub struct PositionFigures {
     /// Of the repetitions that were driven through.
@@ -24,7 +25,8 @@ pub struct PositionFigures {
 }
 
 impl PositionFigures {
-    pub fn take(&mut self, set_point: &SetPoint, position_m: f64) {
+    /// Takes a cycle of the experiment, with the position sensor as it came, m.
+    pub(crate) fn take(&mut self, set_point: &SetPoint, position_m: f64) {
         let error_m = (set_point.position_m - position_m).abs();
         if set_point.moving {
             self.end_rest();
@@ -35,7 +37,7 @@ impl PositionFigures {
     }
 
     /// The repetition, if one is being driven, has come to its end.
-    pub fn end_repetition(&mut self) {
+    pub(crate) fn end_repetition(&mut self) {
         self.end_rest();
         let now = std::mem::take(&mut self.now);
         self.kept.moving_m = larger(self.kept.moving_m, now.moving_m);
@@ -43,7 +45,7 @@ impl PositionFigures {
     }
 
     /// The repetition, if one is being driven, was cut off.
-    pub fn drop_repetition(&mut self) {
+    pub(crate) fn drop_repetition(&mut self) {
         self.now = MaximumErrors::default();
         self.resting.clear();
     }

@@ -14,6 +14,8 @@
 //! | [`parameter_set`] | parameter sets as files |
 //! | [`figures`] | dynamic and static error |
 
+#![warn(missing_docs)] // an interface of other crates
+
 pub mod axis;
 pub mod chains;
 pub mod experiment;

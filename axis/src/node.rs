@@ -27,21 +27,30 @@ pub const STOPPED_CYCLES: u64 = 2000;
 /// Frames of a partner that wait for their cycle; a cycle has three at most.
 const DELAYED_FRAMES: usize = 16;
 
+/// An event of a run for people: printed, and listed in the report.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NodeEvent {
     /// The main chain of an axis went to this state in this cycle, because of this.
     State {
+        /// Axis of the chain.
         axis: Axis,
+        /// The state that was entered.
         #[serde(serialize_with = "in_words")]
         state: MainChainState,
+        /// The rig's cycle whose answer reports the state. Without sensors there is no answer, and the report comes late.
         cycle: u64,
+        /// Why it was entered.
         #[serde(serialize_with = "in_words")]
         cause: MainCause,
     },
+    /// The rig's cycles began again, and all controllers with them.
     RigRestarted,
+    /// The bus is down, after it was up.
     BusLost,
+    /// The bus is up again.
     BusBack,
+    /// Neither sensors nor a tick of the rig came for 0.2 s; once for each silence.
     SensorsSilent,
 }
 
@@ -52,8 +61,11 @@ fn in_words<S: serde::Serializer>(shown: &impl Display, serializer: S) -> Result
 /// A parameter that shall change, already checked against its table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Change {
+    /// Axis whose program holds the parameter.
     pub axis: Axis,
+    /// Index in [`Program::variables`].
     pub place: usize,
+    /// New value, in the variable's unit.
     pub value: f64,
 }
 
@@ -61,7 +73,9 @@ pub struct Change {
 pub struct NodeQueues {
     /// A row of an axis each recorded cycle.
     pub records: Sender<AxisRecord>,
+    /// Events; one that finds the queue full is lost.
     pub news: Sender<NodeEvent>,
+    /// Changes of parameters, applied before the next cycle is answered.
     pub changes: Receiver<Change>,
     /// Lockstep waits for the recorder rather than lose a row.
     pub waits: bool,
@@ -107,6 +121,7 @@ pub trait CalibrationPort {
         false
     }
 
+    /// The rig's cycles began again, and the controller with them: samples of old cycles are another rig's.
     fn restart(&mut self) {}
 
     /// Samples the signals of a controller after it has answered the sensors of a cycle.
@@ -122,12 +137,17 @@ pub enum NoPort {}
 
 impl CalibrationPort for NoPort {}
 
+/// The controllers of a process, one or two, each with its port `P` if it has one.
 pub struct ControllerNode<P = NoPort> {
+    /// The rig as its frames show it.
     pub view: RigView,
     members: Vec<Member<P>>,
     queues: NodeQueues,
+    /// Counts of received frames that `rig.dbc` does not know, or that do not decode.
     pub ignored: IgnoredFrames,
+    /// Rows of the record that were lost: the queue was full, or its reader has ended.
     pub records_dropped: u64,
+    /// The rig has announced its end: nothing is answered until its cycles begin again.
     pub ending: bool,
     /// Cycles that an axis answered, each once.
     pub answered: u64,
@@ -326,10 +346,12 @@ impl<P: CalibrationPort> ControllerNode<P> {
         let _ = self.queues.news.try_send(news);
     }
 
+    /// The controllers in the order in which they answer.
     pub fn controllers(&self) -> impl Iterator<Item = &AxisController> {
         self.members.iter().map(|member| &member.controller)
     }
 
+    /// Port of the controller of `axis`; `None` where it has none, or where another process has the axis.
     pub fn port(&self, axis: Axis) -> Option<&P> {
         self.member(axis)?.port.as_ref()
     }
@@ -338,6 +360,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         self.members.iter().find(|member| member.controller.axis == axis)
     }
 
+    /// Whether all axes of this process are done: no repetition is left.
     pub fn done(&self) -> bool {
         self.controllers().all(|controller| controller.state() == MainChainState::Done)
     }

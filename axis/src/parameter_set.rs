@@ -17,23 +17,32 @@ use settings::{SettingsError, Source};
 use std::fmt::Write;
 use std::path::Path;
 
+/// A value for a variable, by a parameter set or by the command line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
+    /// Axis whose program shall have the variable.
     pub axis: Axis,
     /// Name of the variable, such as `algorithm.gain_per_s`.
     pub name: String,
     /// Its value, not yet checked.
     pub value: f64,
-    /// Where it stands, for messages: `FILE:LINE: `.
+    /// Where it stands, in front of a message: `FILE:LINE: `, or `--set `.
     pub place: String,
 }
 
+/// Reads the set in a file. Names and ranges of its variables are checked where it is applied.
+///
+/// # Errors
+/// [`SettingsError`] for a file that cannot be read, and as for [`parse`].
 pub fn read(path: &Path) -> Result<Vec<Setting>, SettingsError> {
     let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
     parse(&text, path)
 }
 
 /// The set in a text; `file` is for messages.
+///
+/// # Errors
+/// [`SettingsError`] for TOML that does not parse, sections of neither axis, and values that are no finite numbers.
 pub fn parse(text: &str, file: &Path) -> Result<Vec<Setting>, SettingsError> {
     let source = Source::parse(text, file)?;
     let mut root = source.root();

@@ -12,6 +12,7 @@ use algorithms::linearisation::Linearisation;
 use settings::parameters::declare;
 
 settings::parameters! {
+    /// Period, limit, dead zone and manual mode of the post-controller.
     pub struct Parameters {
         every_cycles: crate::program::EVERY_CYCLES,
         opening_limit: declare("", [0.0, 1.0], 1.0, "largest opening in either direction"),
@@ -24,31 +25,40 @@ settings::parameters! {
 /// Share of the dead zone by which the wanted velocity must exceed it to open the valve again.
 const HYSTERESIS: f64 = 0.5;
 
+/// Result of a step; the default is a shut valve.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Output {
+    /// Opening of the valve, -1 to 1; above 0 the axis's rod extends.
     pub opening: f64,
     /// The rod velocity that it stands for, m/s.
-    pub applied_velocity_m_per_s: f64,
+    pub(crate) applied_velocity_m_per_s: f64,
 }
 
+/// Task that turns a wanted velocity into an opening, with the state of its dead zone.
 #[derive(Clone, Debug)]
-pub struct PostController {
+pub(crate) struct PostController {
     linearisation: Linearisation,
     shut: bool,
 }
 
 impl PostController {
-    pub fn new(linearisation: Linearisation) -> Self {
+    /// A task whose dead zone holds the valve shut.
+    pub(crate) fn new(linearisation: Linearisation) -> Self {
         Self { linearisation, shut: true }
     }
 
     /// Forgets what it did, as after [`PostController::new`].
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.shut = true;
     }
 
     /// Turns a finite wanted velocity into an opening.
-    pub fn step(&mut self, wanted_m_per_s: f64, input: &AlgorithmInput, parameters: &Parameters) -> Output {
+    pub(crate) fn step(
+        &mut self,
+        wanted_m_per_s: f64,
+        input: &AlgorithmInput,
+        parameters: &Parameters,
+    ) -> Output {
         if parameters.manual >= 0.5 {
             return self.output(parameters.manual_opening, input);
         }

@@ -17,6 +17,7 @@ use settings::parameters::declare;
 use std::f64::consts::TAU;
 
 settings::parameters! {
+    /// Period and filters of the pre-controller.
     pub struct Parameters {
         every_cycles: crate::program::EVERY_CYCLES,
         velocity_filter_hz: declare("Hz", [1.0, 400.0], 60.0, "cut-off of each of the two low-passes of the velocity"),
@@ -26,22 +27,23 @@ settings::parameters! {
     }
 }
 
+/// From rig coordinates to the extension of an axis's rod, and back.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
     axis: Axis,
     stroke_m: f64,
-    /// Known offset of the position sensor, m: reading less position.
+    /// Known offset of the position sensor, m: reading less position. 0 until the positions of both axes were matched.
     pub offset_m: f64,
 }
 
 impl Geometry {
     /// An axis of this stroke, with a sensor that is taken at its word.
-    pub fn new(axis: Axis, stroke_m: f64) -> Self {
+    pub(crate) fn new(axis: Axis, stroke_m: f64) -> Self {
         Self { axis, stroke_m, offset_m: 0.0 }
     }
 
     /// +1 when the axis's rod extends in the rig's +x, else -1.
-    pub fn direction(&self) -> f64 {
+    pub(crate) fn direction(&self) -> f64 {
         match self.axis {
             Axis::Drive => 1.0,
             Axis::Load => -1.0,
@@ -49,7 +51,7 @@ impl Geometry {
     }
 
     /// Extension of the axis's rod at a rig coordinate, m.
-    pub fn extension_m(&self, position_m: f64) -> f64 {
+    pub(crate) fn extension_m(&self, position_m: f64) -> f64 {
         match self.axis {
             Axis::Drive => position_m,
             Axis::Load => self.stroke_m - position_m,
@@ -57,7 +59,7 @@ impl Geometry {
     }
 
     /// Rig coordinate at an extension of the axis's rod, m.
-    pub fn position_m(&self, extension_m: f64) -> f64 {
+    pub(crate) fn position_m(&self, extension_m: f64) -> f64 {
         // Each axis's map is its own inverse.
         self.extension_m(extension_m)
     }
@@ -96,19 +98,21 @@ struct Memory {
     pressures: [LowPass; 2],
 }
 
+/// Task that scales and filters the sensors, with the state of its filters.
 #[derive(Clone, Debug)]
-pub struct PreController {
+pub(crate) struct PreController {
     pub(crate) geometry: Geometry,
     memory: Option<Memory>,
 }
 
 impl PreController {
-    pub fn new(geometry: Geometry) -> Self {
+    /// A task without a sample.
+    pub(crate) fn new(geometry: Geometry) -> Self {
         Self { geometry, memory: None }
     }
 
     /// Takes another offset of the position sensor, m; no velocity comes of it.
-    pub fn set_offset(&mut self, offset_m: f64) {
+    pub(crate) fn set_offset(&mut self, offset_m: f64) {
         let shift_m = self.geometry.direction() * (self.geometry.offset_m - offset_m);
         self.geometry.offset_m = offset_m;
         if let Some(memory) = &mut self.memory {
@@ -117,18 +121,18 @@ impl PreController {
     }
 
     /// Forgets all samples: what comes next is taken at its word.
-    pub fn reset(&mut self) {
+    pub(crate) fn reset(&mut self) {
         self.memory = None;
     }
 
     /// Forgets all samples and the offset: they were another rig's.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.memory = None;
         self.geometry.offset_m = 0.0;
     }
 
     /// Takes the sensors that came `period_s` after the last ones, and fills in what was measured of `input`.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         sensors: &Sensors,
         period_s: f64,

@@ -26,7 +26,7 @@ use settings::parameters::{Declaration, OutOfRange, Parameter, declare};
 use std::ops::Range;
 
 /// Multiple of the basic cycle of a task; the first parameter of each.
-pub const EVERY_CYCLES: Declaration =
+pub(crate) const EVERY_CYCLES: Declaration =
     declare("cycles", [1.0, 1000.0], 1.0, "multiple of the basic cycle of 1 ms").whole();
 /// A task that is so many cycles late begins anew: a stall is no reason for a jump.
 const STALLED: u64 = 100;
@@ -36,20 +36,25 @@ const STALLED: u64 = 100;
 pub struct Variable {
     /// Task and name, such as `algorithm.gain_per_s`.
     pub name: String,
+    /// Its entry in the table of its task: name without the task, unit, range, default and meaning.
     pub parameter: Parameter,
 }
 
 /// Set-points of a cycle, in rig coordinates; an algorithm uses that of the quantity which it controls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Demand {
+    /// Position set-point; under force control the measured position, at rest.
     pub position: SetPoint,
+    /// Force set-point; 0 under position control.
     pub force: ForceSetPoint,
 }
 
 /// Which algorithm of the program controls the axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActiveAlgorithm {
+    /// That of `[algorithm]`.
     User,
+    /// That of `[giving-way]`, with the limit of the force chain; in a program without it that of `[algorithm]`.
     ForceChain,
 }
 
@@ -65,7 +70,7 @@ struct AlgorithmSlot {
 
 /// A part of the program that is no algorithm and has numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Task {
+pub(crate) enum Task {
     PreController,
     PostController,
     ForceChain,
@@ -86,6 +91,7 @@ struct ForceChainSlot {
     effective: Vec<f64>,
 }
 
+/// The tasks of one axis with their values, and what they keep from cycle to cycle.
 pub struct Program {
     pre: PreController,
     post: PostController,
@@ -101,7 +107,7 @@ pub struct Program {
 }
 
 impl Program {
-    /// Takes the sensors of `cycle`: the pre-controller's task.
+    /// Takes the sensors of `cycle`: the pre-controller's task. `supply_pressure_pa` is absolute, as the rig reports it.
     pub fn observe(&mut self, cycle: u64, sensors: &Sensors, supply_pressure_pa: f64) {
         let parameters = pre_controller::Parameters::of(self.task(Task::PreController));
         let passed = match due(self.observed_cycle, cycle, parameters.every_cycles) {
@@ -158,7 +164,7 @@ impl Program {
     }
 
     /// The valve is shut: the next active algorithm is reset first.
-    pub fn shut(&mut self) {
+    pub(crate) fn shut(&mut self) {
         self.slots().for_each(|slot| slot.stepped_cycle = None);
         self.post_stepped_cycle = None;
         self.output = Output::default();
@@ -166,7 +172,7 @@ impl Program {
     }
 
     /// The rig's time began again, or it is another rig: nothing that was seen holds, the matched offset no more than the rest.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.restart_algorithms();
         self.shut();
         self.slots().for_each(|slot| slot.wanted_m_per_s = 0.0);
@@ -177,7 +183,7 @@ impl Program {
     }
 
     /// Clears latched faults: the chain begins anew.
-    pub fn restart_algorithms(&mut self) {
+    pub(crate) fn restart_algorithms(&mut self) {
         self.slots().for_each(|slot| slot.algorithm.restart());
     }
 
@@ -187,28 +193,29 @@ impl Program {
     }
 
     /// Passes the output of the force chain to its algorithm.
-    pub fn set_chain_output(&mut self, chain: &ForceOutput) {
+    pub(crate) fn set_chain_output(&mut self, chain: &ForceOutput) {
         if let Some(force_chain) = &mut self.force_chain_slot {
             force_chain.chain_output = (chain.feed_forward, chain.limit_m_per_s);
         }
     }
 
-    pub fn has_force_chain_slot(&self) -> bool {
+    /// Whether the program has a `[giving-way]`.
+    pub(crate) fn has_force_chain_slot(&self) -> bool {
         self.force_chain_slot.is_some()
     }
 
     /// Values of a task, in the order of its table.
-    pub fn task(&self, task: Task) -> &[f64] {
+    pub(crate) fn task(&self, task: Task) -> &[f64] {
         &self.values[self.tasks[task as usize].clone()]
     }
 
     /// Position of the axis, less the sensor's offset, m, rig coordinates.
-    pub fn position_m(&self) -> f64 {
+    pub(crate) fn position_m(&self) -> f64 {
         self.pre.geometry.position_m(self.input.position_m)
     }
 
     /// Measured motion of the axis, in rig coordinates.
-    pub fn actual(&self) -> Actual {
+    pub(crate) fn actual(&self) -> Actual {
         let direction = self.pre.geometry.direction();
         Actual {
             position_m: self.position_m(),
@@ -222,23 +229,25 @@ impl Program {
         &self.input
     }
 
+    /// From rig coordinates to the rod's extension; its offset is the matched one.
     pub fn geometry(&self) -> &Geometry {
         &self.pre.geometry
     }
 
     /// Sets the offset of the position sensor, m.
-    pub fn set_offset(&mut self, offset_m: f64) {
+    pub(crate) fn set_offset(&mut self, offset_m: f64) {
         self.pre.set_offset(offset_m);
     }
 
     /// The velocity that the algorithm wants, m/s, along the axis's extension.
-    pub fn wanted_m_per_s(&self, algorithm: ActiveAlgorithm) -> f64 {
+    pub(crate) fn wanted_m_per_s(&self, algorithm: ActiveAlgorithm) -> f64 {
         match (algorithm, &self.force_chain_slot) {
             (ActiveAlgorithm::ForceChain, Some(force_chain)) => force_chain.slot.wanted_m_per_s,
             _ => self.user_slot.wanted_m_per_s,
         }
     }
 
+    /// What the algorithm of `[algorithm]` controls; that of `[giving-way]` always controls a force.
     pub fn controls(&self) -> Quantity {
         self.user_slot.controls
     }
@@ -248,10 +257,12 @@ impl Program {
         &self.variables
     }
 
+    /// Current values of the variables, each in its unit, in the order of [`Program::variables`].
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 
+    /// Index of the variable of this full name; `None` where the program has none.
     pub fn place(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|variable| variable.name == name)
     }
@@ -261,6 +272,9 @@ impl Program {
     /// # Errors
     /// [`OutOfRange`] when it does not allow the value; it keeps its own. What is read at the start only is set all the same:
     /// who changes it while running asks [`Parameter::check_change`] before.
+    ///
+    /// # Panics
+    /// When `place` is none of [`Program::variables`].
     pub fn set(&mut self, place: usize, value: f64) -> Result<(), OutOfRange> {
         self.values[place] = self.variables[place].parameter.check(value)?;
         Ok(())

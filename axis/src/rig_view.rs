@@ -24,13 +24,15 @@ const STATUS_HOLDS_CYCLES: u64 = 100;
 /// The tick counts skipped cycles modulo this.
 const SKIPPED_RANGE: u64 = 1 << 16;
 
+/// Counts of frames, one for each axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct PerAxis {
-    pub drive: u64,
-    pub load: u64,
+    drive: u64,
+    load: u64,
 }
 
 impl PerAxis {
+    /// Frames of `axis`.
     pub fn get(&self, axis: Axis) -> u64 {
         match axis {
             Axis::Drive => self.drive,
@@ -46,11 +48,13 @@ impl PerAxis {
     }
 }
 
+/// What a tick says of the rig beyond its cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TickEvent {
+pub(crate) enum TickEvent {
     Usual,
     /// The rig is another one, or the same started anew: its cycles begin again.
     Restarted,
+    /// The rig announces its end.
     Ending,
 }
 
@@ -67,22 +71,26 @@ struct Account {
     late: PerAxis,
 }
 
+/// Newest sensors, cycle and status of the rig, and an account of its sensor frames.
 #[derive(Default)]
 pub struct RigView {
     /// The newest cycle that is known; `None` before the first tick.
     pub cycle: Option<u64>,
+    /// Cycles that the rig computed after a late wake-up without sending their sensors, by its own count: they are not lost.
     pub skipped: u64,
     sensors: [Option<Sensors>; 2],
     recent: [RecentSensors; 2],
     /// Cycle of the newest sensors of each axis.
     newest: [Option<u64>; 2],
     fresh: [bool; 2],
+    /// Sensor frames that came, late ones and duplicates included.
     pub received: PerAxis,
     /// Sensor frames that came after newer ones of their axis.
     pub late: PerAxis,
     /// Sensor frames that came again.
     pub duplicate: PerAxis,
     account: Option<Account>,
+    /// Sensor frames that the rig sent between its first tick and its newest one, and that did not come.
     pub lost: PerAxis,
     /// Sensor frames that the rig had sent by its first tick that came, and that did not come: lost ones, and those from before
     /// the bus was joined.
@@ -92,7 +100,7 @@ pub struct RigView {
 }
 
 impl RigView {
-    pub fn take_sensors(&mut self, axis: Axis, sensors: Sensors) {
+    pub(crate) fn take_sensors(&mut self, axis: Axis, sensors: Sensors) {
         *self.received.of(axis) += 1;
         match self.recent[axis.index()].take(&sensors) {
             SensorArrival::Newer => {}
@@ -120,7 +128,7 @@ impl RigView {
         self.fresh[axis.index()] = true;
     }
 
-    pub fn take_tick(&mut self, tick: &Tick) -> TickEvent {
+    pub(crate) fn take_tick(&mut self, tick: &Tick) -> TickEvent {
         // The tick's counter wraps after 49.7 days, ours does not: what counts is the way from the cycle that we know.
         let ahead = self.cycle.map(|known| i64::from(tick.cycle.wrapping_sub(known as u32).cast_signed()));
         // Sensors that follow a lost tick may have brought us one round of their counter ahead.
@@ -179,12 +187,12 @@ impl RigView {
         self.account = Some(Account { sent, received: counted, late: self.late });
     }
 
-    pub fn take_status(&mut self, status: RigStatus) {
+    pub(crate) fn take_status(&mut self, status: RigStatus) {
         self.status = Some((self.cycle.unwrap_or(0), status));
     }
 
     /// The newest sensors of an axis with their cycle, once for each frame; `None` before the first tick.
-    pub fn fresh_sensors(&mut self, axis: Axis) -> Option<(u64, Sensors)> {
+    pub(crate) fn fresh_sensors(&mut self, axis: Axis) -> Option<(u64, Sensors)> {
         let cycle = self.cycle?;
         let fresh = std::mem::take(&mut self.fresh[axis.index()]);
         let sensors = self.sensors[axis.index()].filter(|_| fresh)?;
@@ -197,7 +205,7 @@ impl RigView {
     ///
     /// Cycles that the rig skipped make it older too: after those it is the next status that counts. What an axis does while
     /// there is none stands in [`AxisController::answer`](crate::axis::AxisController::answer).
-    pub fn status(&self) -> Option<&RigStatus> {
+    pub(crate) fn status(&self) -> Option<&RigStatus> {
         let (came, status) = self.status.as_ref()?;
         let age = self.cycle.map_or(0, |cycle| cycle.saturating_sub(*came));
         (age <= STATUS_HOLDS_CYCLES).then_some(status)

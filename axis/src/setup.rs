@@ -63,11 +63,15 @@ pub struct FileArguments {
     pub after_emergency_stop: Option<AfterStop>,
 }
 
+/// Rig, experiment and programs of a run.
 pub struct Inputs {
+    /// Numbers of the rig file, its effects among them; no controller reads those.
     pub rig: RigParameters,
     /// The rig file as it stands; empty where there is none.
     pub rig_toml: String,
+    /// The experiment; what follows an emergency stop is the command line's, where that says it.
     pub experiment: Experiment,
+    /// The experiment file as it stands.
     pub experiment_toml: String,
     /// Programs of drive and load, as they stand; `None` for an axis that the experiment leaves out.
     pub programs: [Option<Source>; 2],
@@ -76,17 +80,23 @@ pub struct Inputs {
     experiment_file: PathBuf,
 }
 
+/// Circumstances of a run that no file holds.
 #[derive(Clone, Copy, Debug)]
 pub struct Mode {
-    /// The other axis's controller is waited for.
+    /// The other axis's controller is waited for, and its silence is a fault.
     pub partner_needed: bool,
-    /// Time is real: it is watched.
+    /// Time is real: an algorithm that takes too long is a fault.
     pub real_time: bool,
-    /// Until the rig ends.
+    /// The experiment is repeated until the rig ends.
     pub forever: bool,
 }
 
 impl Inputs {
+    /// Reads the files that the command line names, and the experiment's programs. Programs are checked by [`Self::controller`].
+    ///
+    /// # Errors
+    /// [`InputError`] for files that cannot be read or are wrong, a stroke beyond what the bus carries, and a variable of an axis
+    /// that the experiment leaves out.
     pub fn read(files: &FileArguments) -> Result<Self, InputError> {
         let rig_toml = run_folder::read_text(&files.rig).map_err(InputError::of)?;
         let rig =
@@ -193,6 +203,11 @@ impl Inputs {
         Ok(inputs)
     }
 
+    /// A controller of `axis` before its first cycle; of an axis that the experiment leaves out, one that holds the valve shut.
+    ///
+    /// # Errors
+    /// [`InputError`] for a program that is wrong or does not control the quantity of the set-points, for set-points of forces
+    /// without `[giving-way]`, and for overrides and planned changes that the variables of the program do not allow.
     pub fn controller(&self, axis: Axis, mode: Mode) -> Result<AxisController, InputError> {
         let section =
             sections(&self.experiment).find(|(other, _)| *other == axis).map(|(_, section)| section);
@@ -223,6 +238,7 @@ impl Inputs {
         source.program(axis, &self.rig, real_time).map_err(InputError::of)
     }
 
+    /// Title of the program of an axis; `valve held shut` where the experiment leaves the axis out.
     pub fn program_title(&self, axis: Axis) -> String {
         self.programs[axis.index()]
             .as_ref()

@@ -5,11 +5,13 @@ use crate::program::Program;
 
 /// A parameter that changes at a time of the experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlannedChange {
+pub(crate) struct PlannedChange {
     /// When, s from the experiment's start.
-    pub at_s: f64,
-    pub place: usize,
-    pub value: f64,
+    pub(crate) at_s: f64,
+    /// Index among the variables of the program.
+    pub(crate) place: usize,
+    /// In the variable's unit, within its range.
+    pub(crate) value: f64,
 }
 
 pub(super) struct Changes {

@@ -12,38 +12,53 @@ use protocol::frames::{
     MatchingChainState, Sensors, ValveCommand,
 };
 
+/// Outputs of an axis in a cycle: frames for the bus, an event for people, a row of the record.
 #[derive(Clone, Copy, Debug)]
 pub struct Answer {
+    /// Sent in every cycle; not enabled, with opening 0, when nothing is asked of the axis.
     pub command: ValveCommand,
     /// The axis's own emergency stop, when it is due.
     pub emergency_stop: Option<EmergencyStop>,
+    /// States of the chains, every ten cycles and when one changes.
     pub status: Option<ChainStatus>,
+    /// Averaged position, set-points and control error, every ten cycles and with a status that changed.
     pub values: Option<ChainValues>,
-    pub news: Option<NodeEvent>,
+    /// The main chain entered another state.
+    pub(crate) news: Option<NodeEvent>,
+    /// Row of the record; `None` in cycles that are not recorded.
     pub record: Option<AxisRecord>,
 }
 
 /// A row of `controller-drive.csv` or `controller-load.csv`; rig coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct AxisRecord {
+    /// Axis that answered.
     pub axis: Axis,
     /// The rig's cycle whose sensors are answered.
     pub cycle: u64,
+    /// State of the main chain after these sensors were processed; the same holds of the other chains.
     pub main: MainChainState,
+    /// State of the force chain; on an axis without forces to follow it is idle, or done with the main chain.
     pub force_chain: ForceChainState,
+    /// State of the matching chain; on an axis without forces to follow it is idle.
     pub matching: MatchingChainState,
+    /// State of the emergency stop chain; the valve is shut in all but ready.
     pub emergency_stop: EmergencyStopChainState,
+    /// Position set-point; `None` under force control, and when nothing is asked of the axis.
     pub set_position: Option<SetPoint>,
+    /// Force set-point; `None` under position control, and when nothing is asked of the axis.
     pub set_force: Option<ForceSetPoint>,
     /// Position sensor, less the matched offset, m.
     pub position_m: f64,
     /// Its rate, filtered, m/s.
     pub velocity_m_per_s: f64,
+    /// Force sensor, not filtered, N, compression positive.
     pub force_n: f64,
     /// Velocity that the algorithm wants, along the axis's extension, m/s.
     pub wanted_velocity_m_per_s: f64,
     /// Opening sent, -1 to 1.
     pub opening: f64,
+    /// Whether the valve shall act; if not, the opening is 0.
     pub enabled: bool,
 }
 
@@ -109,6 +124,8 @@ impl AxisRecord {
 }
 
 impl AxisController {
+    /// The row of `cycle`, also where that cycle is not recorded. `sensors` and `command` are those of its answer, which is the
+    /// last one: states and set-points are taken from there.
     pub fn record(&self, cycle: u64, sensors: &Sensors, command: &ValveCommand) -> AxisRecord {
         let geometry = self.program.geometry();
         let status = self.status();

@@ -47,7 +47,8 @@ impl StatusSchedule {
 }
 
 impl AxisController {
-    pub fn status(&self) -> ChainStatus {
+    /// States of the chains as the partner and the rig are told.
+    pub(crate) fn status(&self) -> ChainStatus {
         let (main_chain, ok, repetition) =
             self.supervisory.output.map_or((MainChainState::WaitingForRig, false, 0), |output| {
                 (output.state, output.ok, output.repetition)

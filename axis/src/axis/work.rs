@@ -27,8 +27,9 @@ use crate::set_point::{ForceSetPoint, ForceSource, Motion, SetPoint, SmoothTrans
 use algorithms::algorithm::AlgorithmInput;
 use protocol::frames::{ForceChainState, HandSetPoint, MainChainState, MatchingChainState, RigStatus};
 
+/// What an axis does in the experiment.
 #[derive(Clone, Debug)]
-pub enum Plan {
+pub(crate) enum Plan {
     Shut,
     Position {
         motion: Motion,
@@ -38,17 +39,19 @@ pub enum Plan {
     Force(ForcePlan),
 }
 
+/// Forces of an axis in the experiment, and the way to the first of them.
 #[derive(Clone, Debug)]
-pub struct ForcePlan {
+pub(crate) struct ForcePlan {
     /// Forces of the experiment, from the initial one on.
-    pub source: ForceSource,
+    pub(crate) source: ForceSource,
     /// How long the ramp to the initial force takes, s.
-    pub initial_ramp_s: f64,
-    pub prepare: Vec<Prepare>,
+    pub(crate) initial_ramp_s: f64,
+    /// Steps before the ramp, in this order; each needs linked rods.
+    pub(crate) prepare: Vec<Prepare>,
     /// It gives way to a hand during the experiment, instead of pressing.
-    pub manual: bool,
+    pub(crate) manual: bool,
     /// Limits of forces given by hand; `None`: none are followed.
-    pub by_hand: Option<OperatorLimits>,
+    pub(crate) by_hand: Option<OperatorLimits>,
 }
 
 /// Set-points of a cycle, and the algorithm that shall follow them.

@@ -46,37 +46,44 @@ const RECOVERED_SHARE: f64 = 0.9;
 /// How long the rig must have been recovered.
 const RECOVERED_S: f64 = 0.2;
 
+/// What the way back from an emergency stop needs.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StopConfig {
-    pub after_emergency_stop: AfterStop,
-    pub supply_pressure_pa: f64,
+pub(crate) struct StopConfig {
+    pub(crate) after_emergency_stop: AfterStop,
+    /// Nominal supply pressure, absolute, Pa.
+    pub(crate) supply_pressure_pa: f64,
 }
 
+/// Inputs of the chain in a cycle.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct StopInputs {
-    pub cycle: u64,
+pub(crate) struct StopInputs {
+    pub(crate) cycle: u64,
     /// The rig's last status; `None` before the first, and best when it is older than 100 cycles too.
-    pub rig: Option<RigStatus>,
+    pub(crate) rig: Option<RigStatus>,
     /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
-    pub frame: Option<EmergencyStopReason>,
-    pub console: Console,
-    pub at_standstill: bool,
+    pub(crate) frame: Option<EmergencyStopReason>,
+    pub(crate) console: Console,
+    /// The axis keeps still: see [`settled`](super::settled).
+    pub(crate) at_standstill: bool,
     /// A status of the partner came lately, or none is needed.
-    pub partner_fresh: bool,
+    pub(crate) partner_fresh: bool,
     /// Sensors of this axis came lately and are good.
-    pub sensors_fresh: bool,
+    pub(crate) sensors_fresh: bool,
 }
 
+/// Why the chain entered its state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StopCause {
+pub(crate) enum StopCause {
     Began,
     RigRestarted,
+    /// The rig reports that it is tripped.
     Rig,
     /// Somebody tripped it over the bus.
     Frame(EmergencyStopReason),
     /// This controller tripped it.
     LocalFault(Fault),
     Standstill,
+    /// The axis still moved a second after the trip.
     NoStandstill,
     Released,
     Recovered,
@@ -112,7 +119,7 @@ enum Frames {
 }
 
 #[derive(Clone, Debug)]
-pub struct EmergencyStopChain {
+pub(crate) struct EmergencyStopChain {
     config: StopConfig,
     state: State,
     frames: Frames,
@@ -120,13 +127,13 @@ pub struct EmergencyStopChain {
 }
 
 impl EmergencyStopChain {
-    pub fn new(config: StopConfig) -> Self {
+    pub(crate) fn new(config: StopConfig) -> Self {
         let entered = StateEntry { cycle: 0, state: EmergencyStopChainState::Ready, cause: StopCause::Began };
         Self { config, state: State::Ready, frames: Frames::None, entered }
     }
 
     /// Moves on by one edge at most. The valve is shut unless the result is ready.
-    pub fn advance(&mut self, inputs: &StopInputs) -> EmergencyStopChainState {
+    pub(crate) fn advance(&mut self, inputs: &StopInputs) -> EmergencyStopChainState {
         self.note(inputs);
         if let Some((state, cause)) = self.decide(inputs) {
             self.enter(state, cause, inputs.cycle);
@@ -135,20 +142,20 @@ impl EmergencyStopChain {
     }
 
     /// Trips the emergency stop for a fault of this controller; the first one is kept until it is released.
-    pub fn trip(&mut self, fault: Fault, cycle: u64) {
+    pub(crate) fn trip(&mut self, fault: Fault, cycle: u64) {
         if self.holds().is_none() {
             self.enter(EmergencyStopChainState::Tripped, StopCause::LocalFault(fault), cycle);
         }
     }
 
     /// The rig's time begins anew at `cycle`: so does the chain, and what it held is the old rig's.
-    pub fn restart(&mut self, cycle: u64) {
+    pub(crate) fn restart(&mut self, cycle: u64) {
         self.enter(EmergencyStopChainState::Ready, StopCause::RigRestarted, cycle);
         self.frames = Frames::None;
     }
 
     /// The frame to send in this cycle, if any; to be asked after [`trip`](Self::trip).
-    pub fn frame_due(&mut self, cycle: u64) -> Option<EmergencyStop> {
+    pub(crate) fn frame_due(&mut self, cycle: u64) -> Option<EmergencyStop> {
         match self.frames {
             Frames::Hold { next, reason } if cycle >= next => {
                 self.frames = Frames::Hold { next: cycle + REPEAT_CYCLES, reason };
@@ -163,12 +170,12 @@ impl EmergencyStopChain {
         }
     }
 
-    pub fn state(&self) -> EmergencyStopChainState {
+    pub(crate) fn state(&self) -> EmergencyStopChainState {
         self.entered.state
     }
 
     /// The fault for which this controller holds the emergency stop.
-    pub fn holds(&self) -> Option<Fault> {
+    pub(crate) fn holds(&self) -> Option<Fault> {
         self.local_fault().filter(|local| !local.acknowledged).map(|local| local.fault)
     }
 

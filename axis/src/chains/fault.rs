@@ -8,23 +8,30 @@ use std::fmt;
 /// The faults, each as `Variant "name" Reason: "sentence"`; the reason is that in the frame that trips the emergency stop.
 macro_rules! faults {
     ($($variant:ident $name:literal $reason:ident: $sentence:literal,)*) => {
+        /// Why a controller ended its run and tripped the emergency stop; `Display` gives name and sentence.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum Fault {
-            $($variant,)*
+            $(
+                #[doc = concat!("`", $name, ": ", $sentence, "`")]
+                $variant,
+            )*
         }
 
         impl Fault {
+            /// Every fault, each at the index of its variant.
             pub const ALL: [Self; [$($name),*].len()] = [$(Self::$variant),*];
 
+            /// Name in files and messages, such as `partner-lost`.
             pub const fn name(self) -> &'static str {
                 [$($name),*][self as usize]
             }
 
             /// Reason in the frame that trips the emergency stop.
-            pub const fn reason(self) -> EmergencyStopReason {
+            pub(crate) const fn reason(self) -> EmergencyStopReason {
                 [$(EmergencyStopReason::$reason),*][self as usize]
             }
 
+            /// Finding and advice for people, without a capital at the start and without a full stop.
             pub const fn sentence(self) -> &'static str {
                 [$($sentence),*][self as usize]
             }
@@ -68,7 +75,7 @@ impl Fault {
     /// Whether what caused the fault is over, so that a release may be taken.
     ///
     /// What a person must judge (time-outs, limits, the algorithm) is over when that person releases.
-    pub const fn is_over(self, partner_fresh: bool, sensors_fresh: bool) -> bool {
+    pub(crate) const fn is_over(self, partner_fresh: bool, sensors_fresh: bool) -> bool {
         sensors_fresh && (partner_fresh || !matches!(self.reason(), EmergencyStopReason::PartnerLost))
     }
 }

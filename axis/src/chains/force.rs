@@ -30,9 +30,11 @@ use super::{CYCLE_S, Fault, StateEntry, cycles, elapsed_s};
 use protocol::frames::ForceChainState;
 use settings::parameters::declare;
 
+/// Section of a program file that holds the numbers of the chain; also the task in their names as variables.
 pub const TABLE: &str = "force-chain";
 
 settings::parameters! {
+    /// Bounds on force and velocity between the states of the chain, and how long they must hold.
     pub struct Parameters {
         high_force_n: declare("N", [1.0, 2000.0], 80.0, "above it, at first, the velocity is limited"),
         limited_m_per_s: declare("m/s", [1e-3, 1.0], 0.02, "largest rod velocity while it is limited"),
@@ -53,42 +55,54 @@ const MEAN_VELOCITY_S: f64 = 0.15;
 /// Share of the significant velocity below which, in the mean, movement ends.
 const STILL_SHARE: f64 = 0.5;
 
+/// What the main chain and the experiment ask of the load.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum ForceRequest {
+pub(crate) enum ForceRequest {
     /// Nothing: valve shut, or held still.
     #[default]
     Idle,
+    /// To give way until the linked system is without stress.
     Relieve,
+    /// To give way to a hand.
     Manual,
+    /// To ramp to the initial force, or to hold it.
     InitialRamp,
+    /// To follow the forces of the experiment.
     LoadProfile,
     /// To hold the last force.
     Done,
 }
 
+/// Inputs of the chain in a cycle.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct ForceInputs {
-    pub cycle: u64,
-    pub request: ForceRequest,
-    pub force_n: f64,
+pub(crate) struct ForceInputs {
+    pub(crate) cycle: u64,
+    pub(crate) request: ForceRequest,
+    /// Force sensor, filtered, N, compression positive.
+    pub(crate) force_n: f64,
     /// Velocity of this axis's rod, filtered, m/s.
-    pub velocity_m_per_s: f64,
+    pub(crate) velocity_m_per_s: f64,
 }
 
+/// State of the chain after a cycle, and what it asks of the algorithm of `[giving-way]`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ForceOutput {
-    pub state: ForceChainState,
-    pub limit_m_per_s: Option<f64>,
-    pub feed_forward: bool,
-    pub dead_zone: bool,
+pub(crate) struct ForceOutput {
+    pub(crate) state: ForceChainState,
+    /// Largest rod velocity, m/s; `None`: the chain sets no limit.
+    pub(crate) limit_m_per_s: Option<f64>,
+    /// The velocity is fed forward: the rod moves.
+    pub(crate) feed_forward: bool,
+    /// Control errors within the friction are let be: the rod stands.
+    pub(crate) dead_zone: bool,
     /// Set-point, N; `None` where it is the axis's own.
-    pub set_force_n: Option<f64>,
-    pub relieved: bool,
-    pub fault: Option<Fault>,
+    pub(crate) set_force_n: Option<f64>,
+    pub(crate) relieved: bool,
+    pub(crate) fault: Option<Fault>,
 }
 
+/// Why the chain entered its state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ForceCause {
+pub(crate) enum ForceCause {
     /// The controller or the rig began.
     Began,
     Requested(ForceRequest),
@@ -133,8 +147,9 @@ enum State {
     Fault,
 }
 
+/// The force chain of an axis; the default is idle.
 #[derive(Clone, Debug)]
-pub struct ForceChain {
+pub(crate) struct ForceChain {
     state: State,
     request: ForceRequest,
     /// Mean of the force, with the cycle of its last sample.
@@ -154,7 +169,7 @@ impl ForceChain {
     ///
     /// # Panics
     /// When `values` is not as long as the table.
-    pub fn advance(&mut self, inputs: &ForceInputs, values: &[f64]) -> ForceOutput {
+    pub(crate) fn advance(&mut self, inputs: &ForceInputs, values: &[f64]) -> ForceOutput {
         let numbers = Parameters::of(values);
         self.note(inputs, &numbers);
         if let Some((state, cause)) = self.decide(inputs, &numbers) {
@@ -165,7 +180,7 @@ impl ForceChain {
     }
 
     /// The rig's time begins anew at `cycle`: so does the chain.
-    pub fn restart(&mut self, cycle: u64) {
+    pub(crate) fn restart(&mut self, cycle: u64) {
         *self = Self::default();
         self.entered.cycle = cycle;
     }

@@ -14,24 +14,27 @@ use super::main::{AxisMeasurement, MainChain, MainConfig, MainInputs, MainOutput
 use super::{Console, Fault, Partner};
 use protocol::frames::{EmergencyStopReason, RigStatus};
 
+/// Inputs of both chains in a cycle.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct SupervisoryInputs {
-    pub cycle: u64,
-    pub rig: Option<RigStatus>,
+pub(crate) struct SupervisoryInputs {
+    pub(crate) cycle: u64,
+    /// Status of the rig if it is fresh.
+    pub(crate) rig: Option<RigStatus>,
     /// `None` before the first sensors of this axis, and while they are lost.
-    pub measurement: Option<AxisMeasurement>,
-    pub prepared: bool,
-    pub partner: Partner,
+    pub(crate) measurement: Option<AxisMeasurement>,
+    /// All steps of the preparation are done, or there are none.
+    pub(crate) prepared: bool,
+    pub(crate) partner: Partner,
     /// An EmergencyStop frame without release came since the last cycle, from anybody but this controller.
-    pub frame: Option<EmergencyStopReason>,
-    pub console: Console,
+    pub(crate) frame: Option<EmergencyStopReason>,
+    pub(crate) console: Console,
     /// A fault of this axis that was found since the last cycle.
-    pub fault: Option<Fault>,
+    pub(crate) fault: Option<Fault>,
 }
 
 /// Emergency stop chain and main chain of an axis.
 #[derive(Clone, Debug)]
-pub struct SupervisoryChains {
+pub(crate) struct SupervisoryChains {
     pub(crate) main: MainChain,
     pub(crate) stop: EmergencyStopChain,
     partner_needed: bool,
@@ -39,8 +42,8 @@ pub struct SupervisoryChains {
 }
 
 impl SupervisoryChains {
-    /// A main chain that waits for the rig, and an emergency stop chain that is ready.
-    pub fn new(main: MainConfig, supply_pressure_pa: f64) -> Self {
+    /// A main chain that waits for the rig, and an emergency stop chain that is ready. The supply pressure is nominal, absolute.
+    pub(crate) fn new(main: MainConfig, supply_pressure_pa: f64) -> Self {
         let stop = StopConfig { after_emergency_stop: main.after_emergency_stop, supply_pressure_pa };
         Self {
             partner_needed: main.partner_needed,
@@ -51,7 +54,7 @@ impl SupervisoryChains {
     }
 
     /// Moves both on by one edge at most, and trips for a fault that is new.
-    pub fn advance(&mut self, inputs: &SupervisoryInputs) -> MainOutput {
+    pub(crate) fn advance(&mut self, inputs: &SupervisoryInputs) -> MainOutput {
         let SupervisoryInputs { cycle, rig, measurement, prepared, partner, frame, console, fault } = *inputs;
         let emergency_stop = self.stop.advance(&StopInputs {
             cycle,
@@ -75,7 +78,7 @@ impl SupervisoryChains {
     }
 
     /// The rig's time begins anew at `cycle`: so do both.
-    pub fn restart(&mut self, cycle: u64) {
+    pub(crate) fn restart(&mut self, cycle: u64) {
         self.main.restart(cycle);
         self.stop.restart(cycle);
         self.output = None;

@@ -41,8 +41,9 @@ mod interface;
 #[cfg(test)]
 mod tests;
 
-pub use config::{Lengths, MainConfig, Start, approach_s};
-pub use interface::{AxisMeasurement, MainCause, MainInputs, MainOutput, Phase};
+pub(crate) use config::{Lengths, MainConfig, Start, approach_s};
+pub use interface::MainCause;
+pub(crate) use interface::{AxisMeasurement, MainInputs, MainOutput, Phase};
 
 use super::settled::SettlingDetector;
 use super::sync::repetitions_ahead;
@@ -86,8 +87,9 @@ enum State {
 
 type Edge = (MainChainState, MainCause);
 
+/// The main chain of an axis, with its detector of standstill.
 #[derive(Clone, Debug)]
-pub struct MainChain {
+pub(crate) struct MainChain {
     config: MainConfig,
     settling: SettlingDetector,
     state: State,
@@ -101,7 +103,8 @@ pub struct MainChain {
 }
 
 impl MainChain {
-    pub fn new(config: MainConfig) -> Self {
+    /// A chain that waits for the rig.
+    pub(crate) fn new(config: MainConfig) -> Self {
         let entered = StateEntry { cycle: 0, state: MainChainState::WaitingForRig, cause: MainCause::Began };
         let settling = SettlingDetector::new(config.settled);
         let state = State::WaitingForRig { since: None };
@@ -109,7 +112,7 @@ impl MainChain {
     }
 
     /// Moves on by one edge at most, and says what is asked.
-    pub fn advance(&mut self, inputs: &MainInputs) -> MainOutput {
+    pub(crate) fn advance(&mut self, inputs: &MainInputs) -> MainOutput {
         self.note(inputs);
         if let Some((state, cause)) = self.decide(inputs) {
             self.enter(state, cause, inputs);
@@ -118,13 +121,14 @@ impl MainChain {
     }
 
     /// The rig's time begins anew at `cycle`: so does the chain.
-    pub fn restart(&mut self, cycle: u64) {
+    pub(crate) fn restart(&mut self, cycle: u64) {
         self.settling.clear();
         let inputs = MainInputs { cycle, ..MainInputs::default() };
         self.enter(MainChainState::WaitingForRig, MainCause::RigRestarted, &inputs);
     }
 
-    pub fn still(&self) -> bool {
+    /// Whether the axis keeps still, whatever its set-point.
+    pub(crate) fn still(&self) -> bool {
         self.settling.still
     }
 

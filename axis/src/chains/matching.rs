@@ -21,9 +21,11 @@ use super::{Fault, Partner, StateEntry, cycles};
 use protocol::frames::MatchingChainState;
 use settings::parameters::declare;
 
+/// Section of a program file that holds the numbers of the chain; also the task in their names as variables.
 pub const TABLE: &str = "matching-chain";
 
 settings::parameters! {
+    /// Times of rest and averaging, and bounds on movement and offset.
     pub struct Parameters {
         average_s: declare("s", [0.01, 60.0], 0.5, "time over which both positions are averaged"),
         rest_s: declare("s", [0.0, 60.0], 0.2, "how long the partner must have been at rest before"),
@@ -36,28 +38,32 @@ settings::parameters! {
 /// The partner's averaged position is taken each so many cycles, its period.
 const SAMPLE_CYCLES: u64 = 10;
 
+/// Inputs of the chain in a cycle.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct MatchingInputs {
-    pub cycle: u64,
-    pub requested: bool,
-    pub linked: bool,
-    pub still: bool,
+pub(crate) struct MatchingInputs {
+    pub(crate) cycle: u64,
+    pub(crate) requested: bool,
+    pub(crate) linked: bool,
+    /// This axis keeps still: see [`settled`](super::settled).
+    pub(crate) still: bool,
     /// Position sensor of this axis, without any offset, m.
-    pub position_m: f64,
-    pub partner: Partner,
+    pub(crate) position_m: f64,
+    pub(crate) partner: Partner,
 }
 
+/// State of the chain after a cycle, and its result.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MatchingOutput {
-    pub state: MatchingChainState,
+pub(crate) struct MatchingOutput {
+    pub(crate) state: MatchingChainState,
     /// The last matched offset, to be taken from this axis's sensor, m; 0 before.
-    pub offset_m: f64,
-    pub matched: bool,
-    pub fault: Option<Fault>,
+    pub(crate) offset_m: f64,
+    pub(crate) matched: bool,
+    pub(crate) fault: Option<Fault>,
 }
 
+/// Why the chain entered its state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MatchingCause {
+pub(crate) enum MatchingCause {
     /// The controller or the rig began.
     Began,
     Requested,
@@ -110,8 +116,9 @@ enum State {
     Fault { fault: Fault },
 }
 
+/// The matching chain of an axis; the default is idle, without an offset.
 #[derive(Clone, Debug)]
-pub struct MatchingChain {
+pub(crate) struct MatchingChain {
     state: State,
     requested: bool,
     offset_m: f64,
@@ -130,7 +137,7 @@ impl MatchingChain {
     ///
     /// # Panics
     /// When `values` is not as long as the table.
-    pub fn advance(&mut self, inputs: &MatchingInputs, values: &[f64]) -> MatchingOutput {
+    pub(crate) fn advance(&mut self, inputs: &MatchingInputs, values: &[f64]) -> MatchingOutput {
         let numbers = Parameters::of(values);
         self.note(inputs, &numbers);
         if let Some((state, cause)) = self.decide(inputs, &numbers) {
@@ -141,7 +148,7 @@ impl MatchingChain {
     }
 
     /// The rig's time begins anew at `cycle`: so does the chain, without an offset.
-    pub fn restart(&mut self, cycle: u64) {
+    pub(crate) fn restart(&mut self, cycle: u64) {
         *self = Self::default();
         self.entered.cycle = cycle;
     }

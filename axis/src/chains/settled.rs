@@ -13,9 +13,11 @@
 use super::{cycles, elapsed_s};
 use settings::parameters::declare;
 
+/// Section of a program file that holds the bounds; also the task in their names as variables.
 pub const TABLE: &str = "settled";
 
 settings::parameters! {
+    /// Bounds on position and control error of a settled axis, read once.
     pub struct Bounds {
         still_m: declare("m", [1e-5, 0.1], 0.5e-3, "peak to peak of the position of an axis at rest").at_start_only(),
         position_error_m: declare("m", [1e-5, 0.5], 2e-3, "largest position error of a settled axis").at_start_only(),
@@ -27,10 +29,11 @@ settings::parameters! {
 /// Cycles of one bucket, and the longest gap between samples.
 const BUCKET_CYCLES: u64 = 20;
 const BUCKETS: usize = 10;
-pub const WINDOW_CYCLES: u64 = BUCKET_CYCLES * BUCKETS as u64;
+const WINDOW_CYCLES: u64 = BUCKET_CYCLES * BUCKETS as u64;
 
+/// Control error of an axis in a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ControlError {
+pub(crate) enum ControlError {
     /// It has no set-point: only stillness counts.
     None,
     /// Set-point less position, m.
@@ -51,7 +54,7 @@ struct Bucket {
 
 /// Detects from samples of position and control error whether an axis is settled.
 #[derive(Clone, Debug)]
-pub struct SettlingDetector {
+pub(crate) struct SettlingDetector {
     bounds: Bounds,
     buckets: [Option<Bucket>; BUCKETS],
     /// First and last sample of the window without a gap.
@@ -63,12 +66,12 @@ pub struct SettlingDetector {
 }
 
 impl SettlingDetector {
-    pub fn new(bounds: Bounds) -> Self {
+    pub(crate) fn new(bounds: Bounds) -> Self {
         Self { bounds, buckets: [None; BUCKETS], sampled_cycles: None, since: None, still: false }
     }
 
     /// Takes the sample of `cycle`: position sensor less its offset, unfiltered, and control error.
-    pub fn take(&mut self, cycle: u64, position_m: f64, error: ControlError) {
+    pub(crate) fn take(&mut self, cycle: u64, position_m: f64, error: ControlError) {
         let gap = self.sampled_cycles.is_some_and(|(_, last)| cycle < last || cycle - last > BUCKET_CYCLES);
         if gap {
             self.clear();
@@ -81,12 +84,13 @@ impl SettlingDetector {
         self.since = if settled { self.since.or(Some(cycle)) } else { None };
     }
 
-    pub fn clear(&mut self) {
+    /// Forgets all samples.
+    pub(crate) fn clear(&mut self) {
         *self = Self::new(self.bounds);
     }
 
     /// Whether the axis has been settled for `settling_s` since cycle `from`.
-    pub fn settled_for(&self, settling_s: f64, from: u64, cycle: u64) -> bool {
+    pub(crate) fn settled_for(&self, settling_s: f64, from: u64, cycle: u64) -> bool {
         self.since.is_some_and(|since| cycles(elapsed_s(since.max(from), cycle)) >= cycles(settling_s))
     }
 

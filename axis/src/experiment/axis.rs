@@ -28,32 +28,39 @@ use settings::parameters::Parameter;
 use settings::{Section, SettingsError};
 use std::path::{Path, PathBuf};
 
+/// `[drive]` or `[load]` of an experiment: program, set-points, and what precedes them.
 #[derive(Clone, Debug)]
 pub struct AxisExperiment {
+    /// Program that controls the axis, unless the command line names another.
     pub program: ProgramReference,
-    /// Where initial positioning goes, m; `None`: it stays where it is.
+    /// Where initial positioning goes and the row begins, m, rig coordinates; not used with a row of forces.
     pub start_m: Option<f64>,
     /// Steps of the preparation after initial positioning, in this order.
-    pub prepare: Vec<Prepare>,
-    pub initial_ramp_s: f64,
+    pub(crate) prepare: Vec<Prepare>,
+    /// Time of the ramp from 0 to the initial force, s.
+    pub(crate) initial_ramp_s: f64,
     /// A hand leads the axis during the experiment, under force control with set-point zero, instead of its set-points.
-    pub manual: bool,
-    pub set_points: SetPoints,
+    /// Not used with a row of positions.
+    pub(crate) manual: bool,
+    pub(crate) set_points: SetPoints,
     /// Limits of set-points given by hand; `None`: none are followed.
-    pub by_hand: Option<OperatorLimits>,
+    pub(crate) by_hand: Option<OperatorLimits>,
     /// Parameters changed while running, in the order of their times.
-    pub changes: Vec<Change>,
+    pub(crate) changes: Vec<Change>,
 }
 
+/// The key `program` of an axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ProgramReference {
+    /// A name without its folder and `.toml`, or a path ending in `.toml`, from the experiment's folder.
     pub written: String,
     /// Line in the experiment file, from 1.
-    pub line: usize,
+    pub(crate) line: usize,
 }
 
+/// A step between initial positioning and the ramp to the initial force, of an axis under force control.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Prepare {
+pub(crate) enum Prepare {
     /// Relieve the linked system of stress.
     Relieve,
     /// Match the position of both axes.
@@ -62,29 +69,32 @@ pub enum Prepare {
 
 /// Limits of set-points given by hand, in m or N.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OperatorLimits {
+pub(crate) struct OperatorLimits {
     /// Largest rate on the way to one, per s.
-    pub rate_per_s: f64,
+    pub(crate) rate_per_s: f64,
     /// Least and largest one; others are taken to these.
-    pub range: [f64; 2],
+    pub(crate) range: [f64; 2],
 }
 
+/// Row of set-points of an axis.
 #[derive(Clone, Debug)]
-pub enum SetPoints {
+pub(crate) enum SetPoints {
+    /// Position over time.
     Positions(Motion),
     /// Force over time and over what the axis does.
     Forces(ForceProfile),
 }
 
 impl SetPoints {
-    pub fn quantity(&self) -> Quantity {
+    pub(crate) fn quantity(&self) -> Quantity {
         match self {
             Self::Positions(_) => Quantity::Position,
             Self::Forces(_) => Quantity::Force,
         }
     }
 
-    pub fn duration_s(&self) -> f64 {
+    /// From the first set-point to the end of the row, s.
+    pub(crate) fn duration_s(&self) -> f64 {
         match self {
             Self::Positions(motion) => motion.duration_s(),
             Self::Forces(profile) => profile.duration_s(),
@@ -92,16 +102,17 @@ impl SetPoints {
     }
 }
 
+/// A parameter of the program that changes at a time of the experiment.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Change {
+pub(crate) struct Change {
     /// When, s after the experiment began.
-    pub at_s: f64,
+    pub(crate) at_s: f64,
     /// Which one, such as `algorithm.gain_per_s`.
-    pub parameter: String,
+    pub(crate) parameter: String,
     /// Its new value, in the parameter's unit.
-    pub value: f64,
+    pub(crate) value: f64,
     /// Line in the experiment file, from 1.
-    pub line: usize,
+    pub(crate) line: usize,
 }
 
 static RAMP: Parameter =
@@ -183,7 +194,7 @@ impl AxisExperiment {
     }
 
     /// The force that the axis begins with, N; 0 when it is position controlled.
-    pub fn initial_force_n(&self) -> f64 {
+    pub(crate) fn initial_force_n(&self) -> f64 {
         match &self.set_points {
             SetPoints::Positions(_) => 0.0,
             SetPoints::Forces(profile) => profile.initial_force_n(),
@@ -191,7 +202,7 @@ impl AxisExperiment {
     }
 
     /// The program's file: `../programs/NAME.toml` from the experiment's folder, or the path from there that ends in .toml.
-    pub fn program_path(&self, experiment_file: &Path) -> PathBuf {
+    pub(crate) fn program_path(&self, experiment_file: &Path) -> PathBuf {
         let (folder, written) = (experiment_file.parent().unwrap_or(Path::new("")), &self.program.written);
         if written.ends_with(".toml") {
             return folder.join(written);

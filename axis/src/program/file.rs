@@ -52,15 +52,22 @@ const KEYS: [&str; 8] = [
     settled::TABLE,
 ];
 
+/// The text of a program file; [`Self::program`] checks it.
 #[derive(Clone, Debug, serde::Serialize)]
 pub struct Source {
+    /// Path of the file, for messages; the program's libraries are found from its folder.
     pub path: PathBuf,
+    /// Name for people; [`Self::read`] takes it from the key `title`.
     pub title: String,
+    /// Content of the file.
     pub text: String,
 }
 
 impl Source {
     /// Reads the file and its title.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for a file that cannot be read, TOML that does not parse, unknown sections, and no title.
     pub fn read(path: &Path) -> Result<Self, SettingsError> {
         let text = std::fs::read_to_string(path).map_err(|error| SettingsError::unreadable(path, &error))?;
         let title =
@@ -75,6 +82,9 @@ impl Source {
     }
 
     /// Settings of the file other than numbers, by full key: they are fixed while the program runs.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for TOML that does not parse, unknown sections, and a section that is no table.
     pub fn fixed_settings(&self) -> Result<FixedSettings, SettingsError> {
         let source = settings::Source::parse(&self.text, &self.path)?;
         let mut root = root(&source)?;
@@ -93,6 +103,10 @@ impl Source {
 
     /// The program of `axis` that the file describes, for a rig of these nominal numbers. The time that an algorithm takes is
     /// watched where it is `real_time`.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for unknown keys and algorithms, values out of range, a library that cannot be loaded, and an algorithm
+    /// of `[giving-way]` that does not control a force or lacks the parameters `moving` and `limit_m_per_s`.
     pub fn program(
         &self,
         axis: Axis,

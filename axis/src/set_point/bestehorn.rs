@@ -8,7 +8,7 @@
 use super::law::{BOTH, Kind, Law, ProfilePoint, ShapedTransition};
 use std::f64::consts::TAU;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "bestehorn",
     about: "Bestehorn sinoid to a place",
     serves: BOTH,

@@ -13,11 +13,11 @@
 //!
 //! A new load is a file in the folder beside this one and a line in [`KINDS`].
 
-pub mod at_position;
-pub mod damper;
-pub mod dry_friction;
-pub mod mass;
-pub mod spring;
+pub(super) mod at_position;
+mod damper;
+mod dry_friction;
+mod mass;
+mod spring;
 
 use super::law::{Law, ProfilePoint, SegmentReader};
 use super::row::{Row, RowPosition, RowSegment};
@@ -31,13 +31,17 @@ use std::sync::Arc;
 /// Loads that depend on what the axis does.
 pub const KINDS: &[Kind] = &[spring::KIND, damper::KIND, mass::KIND, dry_friction::KIND];
 
+/// A load that an experiment file can name.
 pub struct Kind {
+    /// Name in an experiment file, the value of `law`.
     pub name: &'static str,
+    /// What it does, in a clause for lists.
     pub about: &'static str,
     pub(crate) read: fn(&mut SegmentReader<'_, '_>) -> Result<Arc<dyn Load>, SettingsError>,
 }
 
-pub trait Load: fmt::Debug + Send + Sync {
+/// A force that follows the motion of the axis.
+pub(crate) trait Load: fmt::Debug + Send + Sync {
     /// Force added to the base force, N, and its rate, N/s.
     fn at(&self, actual: &Actual) -> [f64; 2];
 }
@@ -75,17 +79,18 @@ impl Segment {
 
 /// Force over time: a start and a row of segments. It does not change while it runs; see [`ForceSource`].
 #[derive(Clone, Debug)]
-pub struct ForceProfile {
+pub(crate) struct ForceProfile {
     pub(super) row: Row<Segment>,
     pub(super) limit_n: f64,
 }
 
 impl ForceProfile {
-    pub fn duration_s(&self) -> f64 {
+    /// From the start to the end of the row, s.
+    pub(crate) fn duration_s(&self) -> f64 {
         self.row.duration_s()
     }
 
-    pub fn initial_force_n(&self) -> f64 {
+    pub(crate) fn initial_force_n(&self) -> f64 {
         self.row.start
     }
 
@@ -113,22 +118,23 @@ struct Memory {
 
 /// A profile being driven; asked once a cycle, with time that does not go back.
 #[derive(Clone, Debug)]
-pub struct ForceSource {
+pub(crate) struct ForceSource {
     pub(crate) profile: Arc<ForceProfile>,
     memory: Memory,
 }
 
 impl ForceSource {
-    pub fn new(profile: ForceProfile) -> Self {
+    pub(crate) fn new(profile: ForceProfile) -> Self {
         Self { profile: Arc::new(profile), memory: Memory::default() }
     }
 
-    pub fn reset(&mut self) {
+    /// Begins the profile anew.
+    pub(crate) fn reset(&mut self) {
         self.memory = Memory::default();
     }
 
     /// The set-point `time_s` after the start: the initial force before it, [`Self::end`] from the end on.
-    pub fn at(&mut self, time_s: f64, actual: &Actual) -> ForceSetPoint {
+    pub(crate) fn at(&mut self, time_s: f64, actual: &Actual) -> ForceSetPoint {
         let unlimited = match self.profile.row.locate(time_s) {
             RowPosition::Before => ProfilePoint::at_rest(self.profile.initial_force_n()),
             RowPosition::After => return self.end(),
@@ -155,7 +161,7 @@ impl ForceSource {
 
     /// The set-point that is held from the end on. After a load that depends on the axis it is the force that it had last, so
     /// that nothing jumps.
-    pub fn end(&self) -> ForceSetPoint {
+    pub(crate) fn end(&self) -> ForceSetPoint {
         ForceSetPoint::at_rest(self.memory.last_n.unwrap_or(self.profile.row.end))
     }
 }

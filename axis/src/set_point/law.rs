@@ -26,9 +26,13 @@ pub const KINDS: &[Kind] = &[
     table::KIND,
 ];
 
+/// A law of time that an experiment file can name.
 pub struct Kind {
+    /// Name in an experiment file, the value of `law`.
     pub name: &'static str,
+    /// What it does, in a clause for lists.
     pub about: &'static str,
+    /// Quantities whose rows may have it.
     pub serves: &'static [Quantity],
     pub(crate) read: fn(&mut SegmentReader<'_, '_>) -> Result<Arc<dyn Law>, SettingsError>,
 }
@@ -36,7 +40,7 @@ pub struct Kind {
 pub(super) const BOTH: &[Quantity] = &[Quantity::Position, Quantity::Force];
 
 /// A value over time, from the end value of the segment before it.
-pub trait Law: fmt::Debug + Send + Sync {
+pub(crate) trait Law: fmt::Debug + Send + Sync {
     /// Value and derivatives `time_s` after the beginning, 0 to the duration.
     fn at(&self, time_s: f64) -> ProfilePoint;
     /// Its duration, end value and range; read when the experiment is loaded, not while it runs.
@@ -44,7 +48,7 @@ pub trait Law: fmt::Debug + Send + Sync {
 }
 
 #[derive(Clone, Copy, Debug)]
-pub struct Extent {
+pub(crate) struct Extent {
     pub(super) duration_s: f64,
     /// The value from its end on.
     pub(super) end: f64,

@@ -16,7 +16,7 @@
 use super::law::{BOTH, Kind, ShapedTransition};
 use std::f64::consts::PI;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "modified-sine",
     about: "modified sine to a place: slower at its fastest than the sinoid",
     serves: BOTH,

@@ -18,7 +18,7 @@ use settings::parameters::Parameter;
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
-pub const SINE: Kind = Kind {
+pub(super) const SINE: Kind = Kind {
     name: "sine",
     about: "to either side at one frequency",
     serves: BOTH,
@@ -28,7 +28,7 @@ pub const SINE: Kind = Kind {
     },
 };
 
-pub const CHIRP: Kind = Kind {
+pub(super) const CHIRP: Kind = Kind {
     name: "chirp",
     about: "to either side at a frequency that sweeps",
     serves: BOTH,

@@ -16,7 +16,7 @@ use settings::SettingsError;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "pseudo-random-steps",
     about: "every now and then at once to a random level, the same ones for the same seed",
     serves: BOTH,

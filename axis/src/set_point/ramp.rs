@@ -6,7 +6,7 @@
 
 use super::law::{BOTH, Kind, ShapedTransition};
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "ramp",
     about: "at one rate to a place",
     serves: BOTH,

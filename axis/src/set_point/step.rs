@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// How long a jump counts as moving: a basic cycle.
 pub(super) const JUMP_S: f64 = 0.000_999;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "step",
     about: "at once to a place, which is then held",
     serves: BOTH,
@@ -22,14 +22,14 @@ pub const KIND: Kind = Kind {
     },
 };
 
-pub const REST: Kind = Kind {
+pub(super) const REST: Kind = Kind {
     name: "rest",
     about: "stays where it is",
     serves: BOTH,
     read: |reader| Step::read(reader, reader.from, 0.0),
 };
 
-pub const CONSTANT: Kind = Kind {
+pub(super) const CONSTANT: Kind = Kind {
     name: "constant",
     about: "a constant force",
     serves: &[Quantity::Force],

@@ -19,7 +19,7 @@ use settings::SettingsError;
 use std::path::Path;
 use std::sync::Arc;
 
-pub const KIND: Kind =
+pub(super) const KIND: Kind =
     Kind { name: "table", about: "a course of its own, from a CSV file", serves: BOTH, read };
 
 const TIME: &str = "time_s";

@@ -14,7 +14,7 @@ use algorithms::algorithm::Quantity;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "trapezoidal",
     about: "trapezoidal velocity to a place; the time follows from the way",
     serves: &[Quantity::Position],

@@ -9,18 +9,20 @@ pub(super) const PARTNER_TIMEOUT_S: f64 = 10.0;
 
 /// How long the states are meant to last, s.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lengths {
+pub(crate) struct Lengths {
     /// Preparing; 0 when there is nothing to prepare.
-    pub prepare_s: f64,
+    pub(crate) prepare_s: f64,
     /// Ramp to the initial force; 0 when there is none.
-    pub initial_force_s: f64,
-    pub experiment_s: f64,
+    pub(crate) initial_force_s: f64,
+    /// One repetition of the set-points; the longer of both axes.
+    pub(crate) experiment_s: f64,
 }
 
 /// Condition that ends the settling before the experiment, besides being settled.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Start {
+pub(crate) enum Start {
+    /// No further condition.
     #[default]
     ByItself,
     /// `RunControl` start: once for all repetitions, again after an abort.
@@ -30,28 +32,30 @@ pub enum Start {
 /// Configuration of the main chain of one axis. Both axes must be given the same, save for `start_m`, `prepares` and
 /// `lengths`.
 #[derive(Clone, Debug, PartialEq)]
-pub struct MainConfig {
-    pub experiment: u8,
-    pub partner_needed: bool,
+pub(crate) struct MainConfig {
+    /// Number of the experiment on the bus.
+    pub(crate) experiment: u8,
+    /// Whether a state is left only together with the other axis's chain.
+    pub(crate) partner_needed: bool,
     /// Where the initial positioning ends, m; `None` for an axis that is not positioned.
-    pub start_m: Option<f64>,
+    pub(crate) start_m: Option<f64>,
     /// Whether preparing waits for `prepared`.
-    pub prepares: bool,
+    pub(crate) prepares: bool,
     /// How long the states are meant to last.
-    pub lengths: Lengths,
+    pub(crate) lengths: Lengths,
     /// How long they are meant to last for the slower of both axes.
-    pub longest_lengths: Lengths,
+    pub(crate) longest_lengths: Lengths,
     /// Longest initial positioning of either axis, s.
-    pub approach_longest_s: f64,
+    pub(crate) approach_longest_s: f64,
     /// How often the experiment is run; `None`: until the rig ends.
-    pub repetitions: Option<u32>,
+    pub(crate) repetitions: Option<u32>,
     /// How long the axis must have been settled, before and after, s.
-    pub settling_s: f64,
+    pub(crate) settling_s: f64,
     /// How long each state may take beyond what it is meant to, s.
-    pub settling_timeout_s: f64,
-    pub start: Start,
-    pub after_emergency_stop: AfterStop,
-    pub settled: Bounds,
+    pub(crate) settling_timeout_s: f64,
+    pub(crate) start: Start,
+    pub(crate) after_emergency_stop: AfterStop,
+    pub(crate) settled: Bounds,
 }
 
 impl Default for MainConfig {
@@ -75,6 +79,6 @@ impl Default for MainConfig {
 }
 
 /// Seconds of the way from `from_m` to `to_m`: gentle beside any experiment.
-pub fn approach_s(from_m: f64, to_m: f64) -> f64 {
+pub(crate) fn approach_s(from_m: f64, to_m: f64) -> f64 {
     ((to_m - from_m).abs() / APPROACH_M_PER_S).max(APPROACH_SHORTEST_S)
 }

@@ -7,29 +7,31 @@ use std::fmt;
 
 /// Measurement of the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AxisMeasurement {
+pub(crate) struct AxisMeasurement {
     /// Position sensor as it came, less the matched offset, rig coordinates, m.
-    pub position_m: f64,
-    pub error: ControlError,
+    pub(crate) position_m: f64,
+    pub(crate) error: ControlError,
 }
 
+/// Inputs of the chain in a cycle.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct MainInputs {
-    pub cycle: u64,
+pub(crate) struct MainInputs {
+    pub(crate) cycle: u64,
     /// `None` before the first sensors of this axis.
-    pub measurement: Option<AxisMeasurement>,
-    pub prepared: bool,
-    pub partner: Partner,
+    pub(crate) measurement: Option<AxisMeasurement>,
+    /// All steps of the preparation are done, or there are none.
+    pub(crate) prepared: bool,
+    pub(crate) partner: Partner,
     /// State of this axis's emergency stop chain in this cycle.
-    pub emergency_stop: EmergencyStopChainState,
-    pub console: Console,
+    pub(crate) emergency_stop: EmergencyStopChainState,
+    pub(crate) console: Console,
     /// A fault of this axis: sensors, limits, algorithm, force or matching chain.
-    pub fault: Option<Fault>,
+    pub(crate) fault: Option<Fault>,
 }
 
 /// What is asked of the axis. `elapsed_s` is the time since the phase began, s, and may go on beyond its duration.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Phase {
+pub(crate) enum Phase {
     /// Hold the valve shut.
     Shut,
     /// Move from `from_m`, where the carriage was, to the start along a Bestehorn sinoid. An axis that is not
@@ -47,29 +49,42 @@ pub enum Phase {
     HoldEnd,
 }
 
+/// State of the chain after a cycle, and what it asks of the axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MainOutput {
-    pub state: MainChainState,
+pub(crate) struct MainOutput {
+    pub(crate) state: MainChainState,
     /// Repetitions before this one; the bus has its low 8 bits.
-    pub repetition: u32,
+    pub(crate) repetition: u32,
     /// The condition for leaving the state is fulfilled on this side.
-    pub ok: bool,
-    pub phase: Phase,
-    pub fault: Option<Fault>,
+    pub(crate) ok: bool,
+    pub(crate) phase: Phase,
+    pub(crate) fault: Option<Fault>,
 }
 
+/// Why the main chain entered its state; `Display` says it in a clause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MainCause {
+    /// The controller was started; the chain waits for the rig.
     Began,
+    /// The rig's cycles began again; the chain waits for the rig.
     RigRestarted,
+    /// The condition of the state before held on this axis, and on the other one if its controller is needed.
     Ready,
+    /// Final settling is over, and another repetition follows.
     NextRepetition,
+    /// The emergency stop chain of this axis is not ready.
     EmergencyStop,
+    /// `RunControl` abort.
     Console,
+    /// The other axis's main chain is aborted.
     PartnerAborted,
+    /// The other axis's main chain is in fault.
     PartnerFault,
+    /// A fault that this axis found, in itself or in its partner.
     Fault(Fault),
+    /// The emergency stop chain is ready again, and nobody aborted the run: the repetition begins anew.
     Recovered,
+    /// `RunControl` start after an abort, or after a fault without an emergency stop: the repetition begins anew.
     Started,
 }
 

@@ -12,7 +12,7 @@ use crate::set_point::Actual;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "damper",
     about: "opposes the velocity in proportion",
     read: |reader| Ok(Arc::new(Damper { damping_n_s_per_m: reader.number(&DAMPING)? })),

@@ -13,7 +13,7 @@ use crate::set_point::Actual;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "dry-friction",
     about: "a force of one size against the motion",
     read: |reader| {

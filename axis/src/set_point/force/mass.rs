@@ -12,7 +12,7 @@ use crate::set_point::Actual;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "mass",
     about: "opposes the acceleration in proportion",
     read: |reader| Ok(Arc::new(Mass { mass_kg: reader.number(&MASS)? })),

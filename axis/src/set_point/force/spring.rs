@@ -12,7 +12,7 @@ use crate::set_point::Actual;
 use settings::parameters::Parameter;
 use std::sync::Arc;
 
-pub const KIND: Kind = Kind {
+pub(super) const KIND: Kind = Kind {
     name: "spring",
     about: "grows with the way from a position of rest",
     read: |reader| {
