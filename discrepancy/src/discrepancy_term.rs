@@ -26,7 +26,7 @@ use crate::refit::{
     EffectEstimate, coordinate_columns, linearise_at, prior_deviations, prior_precisions, rig_of,
 };
 use crate::report::{LocatedTerm, LocatedVariable};
-use crate::windows::{BLOCK, BLOCKS, FORCE, InputProducts, UnknownKind};
+use crate::windows::{BLOCK_PERIODS, BLOCKS_PER_WINDOW, FORCE, InputProducts, UnknownKind};
 use model_fit::parallel;
 use nalgebra::DMatrix;
 use plant::Axis;
@@ -268,7 +268,9 @@ impl Term {
         };
         values
             .iter()
-            .map(|window| DMatrix::from_fn(BLOCKS, knots.len(), |block, hat| row(&window[block], hat)))
+            .map(|window| {
+                DMatrix::from_fn(BLOCKS_PER_WINDOW, knots.len(), |block, hat| row(&window[block], hat))
+            })
             .collect()
     }
 
@@ -284,7 +286,7 @@ impl Term {
             let mut from = 0;
             for (kind, hats) in kinds.iter().zip(&hats) {
                 let hats = &hats[at];
-                inputs.view_mut((kind.place() * BLOCKS, from), hats.shape()).copy_from(hats);
+                inputs.view_mut((kind.place() * BLOCKS_PER_WINDOW, from), hats.shape()).copy_from(hats);
                 from += hats.ncols();
             }
             let cross = &window.cross[axis] * &inputs;
@@ -309,7 +311,9 @@ type BlockValues = Vec<[f64; VARIABLES.len()]>;
 
 fn values_of(places: &[(&GriddedRecord, usize)], axis: usize, kind: UnknownKind) -> Vec<BlockValues> {
     let window = |(record, start): &(&GriddedRecord, usize)| {
-        (0..BLOCKS).map(|block| variables(record, axis, start + block * BLOCK, kind)).collect()
+        (0..BLOCKS_PER_WINDOW)
+            .map(|block| variables(record, axis, start + block * BLOCK_PERIODS, kind))
+            .collect()
     };
     places.iter().map(window).collect()
 }
@@ -325,8 +329,8 @@ fn simulated_forces(engine: &Engine<'_>, simulated: &[f64], values: &mut [[Vec<B
             for at in window..window + part.count() {
                 let readings: Vec<f64> =
                     simulated[at * rows..][..rows].iter().skip(output).step_by(width).copied().collect();
-                for (block, readings) in readings.chunks_exact(BLOCK).enumerate() {
-                    let force_n = noise * readings.iter().sum::<f64>() / BLOCK as f64;
+                for (block, readings) in readings.chunks_exact(BLOCK_PERIODS).enumerate() {
+                    let force_n = noise * readings.iter().sum::<f64>() / BLOCK_PERIODS as f64;
                     values[*axis].iter_mut().for_each(|balance| balance[at][block][locate::FORCE] = force_n);
                 }
             }

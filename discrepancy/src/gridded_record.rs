@@ -34,13 +34,13 @@ const POSITION_HALF_WIDTH: usize = 10;
 /// The same of a pressure.
 const PRESSURE_REACH: usize = 5;
 /// Differences in a block of the autocorrelation estimate, and the fewest blocks at rest.
-const AUTOCORRELATION_BLOCK: usize = 25;
+const LAG1_BLOCK_DIFFERENCES: usize = 25;
 const FEWEST_AT_REST: usize = 10;
 /// Autocorrelation and jitter below which they count as zero.
 const LEAST_AUTOCORRELATION: f64 = 0.15;
 const LEAST_JITTER_S: f64 = 2e-5;
 /// Samples in a block of the jitter estimate, and the lowest speed of a block.
-const JITTER_BLOCK: usize = 20;
+const JITTER_BLOCK_SAMPLES: usize = 20;
 const JITTER_SPEED_M_PER_S: f64 = 0.1;
 /// Longest run of missing commands in a window.
 pub(crate) const HELD_LONGEST: usize = 3;
@@ -316,9 +316,9 @@ impl GriddedRecord {
 /// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1
 /// - share).
 fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
-    let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / AUTOCORRELATION_BLOCK)
+    let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / LAG1_BLOCK_DIFFERENCES)
         .filter_map(|block| {
-            let places = block * AUTOCORRELATION_BLOCK..(block + 1) * AUTOCORRELATION_BLOCK;
+            let places = block * LAG1_BLOCK_DIFFERENCES..(block + 1) * LAG1_BLOCK_DIFFERENCES;
             let differences: Option<Vec<f64>> = places
                 .map(|at| if resting[at] { Some(values[at + 1]? - values[at]?) } else { None })
                 .collect();
@@ -337,10 +337,10 @@ fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) ->
 /// Sampling jitter: the part of the scatter of positions around their parabolas that grows with the speed.
 fn jitter_s(parabolas: &[Option<Parabola>], positions: &[Option<f64>], resting: &[bool]) -> f64 {
     let median_of = |of: &dyn Fn(usize) -> Option<f64>| -> Option<f64> {
-        let mut blocks: Vec<f64> = (0..positions.len() / JITTER_BLOCK)
+        let mut blocks: Vec<f64> = (0..positions.len() / JITTER_BLOCK_SAMPLES)
             .filter_map(|block| {
                 let values: Option<Vec<f64>> =
-                    (block * JITTER_BLOCK..(block + 1) * JITTER_BLOCK).map(of).collect();
+                    (block * JITTER_BLOCK_SAMPLES..(block + 1) * JITTER_BLOCK_SAMPLES).map(of).collect();
                 values.map(|values| mean(&values))
             })
             .collect();

@@ -24,8 +24,8 @@ use estimate::{Unknowns, estimate};
 use plant::{Axis, PERIOD_S, RigParameters};
 use regime::{REGIMES, Regimes};
 
-/// Periods of a window.
-pub(crate) const WINDOW: usize = 20;
+/// Periods of a window here, shorter than one of the fits ([`crate::windows::WINDOW_PERIODS`]).
+pub(crate) const SHORT_WINDOW_PERIODS: usize = 20;
 /// What an unknown input may depend on.
 pub const VARIABLES: [WindowVariable; 19] = [
     variable("x", "m", 0, 1),

@@ -23,7 +23,7 @@ mod whiten;
 
 use crate::gridded_record::{AxisState, CHANNELS, GriddedRecord};
 use crate::sensor_inverse::SensorInverse;
-pub(crate) use input_responses::{BLOCK, BLOCKS, InputProducts, UnknownKind};
+pub(crate) use input_responses::{BLOCK_PERIODS, BLOCKS_PER_WINDOW, InputProducts, UnknownKind};
 use plant::effects::sheet::Part;
 use plant::{Batch, Inputs, Plant, RigParameters};
 pub use reference_run::{ReferenceRun, VariableRanges};
@@ -32,7 +32,7 @@ pub(crate) use starts::{first_state, set_state, state_at};
 use whiten::{SPIKE, jitter_sensitivity_of};
 
 /// Periods of a window.
-pub(crate) const WINDOW: usize = 400;
+pub(crate) const WINDOW_PERIODS: usize = 400;
 /// Index of the force among the channels.
 pub(crate) const FORCE: usize = 1;
 /// Integration substeps of a period in the search and in its finite differences.
@@ -78,14 +78,14 @@ impl<'a> Windows<'a> {
         let measured = (0..2).filter(|axis| record.measured[*axis]);
         let outputs: Vec<_> = measured.flat_map(|axis| (0..CHANNELS).map(move |at| (axis, at))).collect();
         // The first window fills lags and internal states and is not judged [rig-model.md: a record is judged after 0.1 s].
-        let starts: Vec<usize> = (1..record.len() / WINDOW)
-            .map(|window| window * WINDOW)
-            .filter(|start| !record.excluded_periods[*start..start + WINDOW].contains(&true))
+        let starts: Vec<usize> = (1..record.len() / WINDOW_PERIODS)
+            .map(|window| window * WINDOW_PERIODS)
+            .filter(|start| !record.excluded_periods[*start..start + WINDOW_PERIODS].contains(&true))
             .collect();
-        let mut readings = Vec::with_capacity(starts.len() * WINDOW * outputs.len());
+        let mut readings = Vec::with_capacity(starts.len() * WINDOW_PERIODS * outputs.len());
         let mut valid = Vec::with_capacity(readings.capacity());
         for start in &starts {
-            for samples in &record.samples[*start..start + WINDOW] {
+            for samples in &record.samples[*start..start + WINDOW_PERIODS] {
                 for (axis, at) in &outputs {
                     let sample = samples[*axis][*at];
                     valid.push(sample.is_some());
@@ -93,10 +93,11 @@ impl<'a> Windows<'a> {
                 }
             }
         }
-        let points =
-            (0..record.len() / WINDOW).map(|window| record.smoothed_states[window * WINDOW]).collect();
+        let points = (0..record.len() / WINDOW_PERIODS)
+            .map(|window| record.smoothed_states[window * WINDOW_PERIODS])
+            .collect();
         let mut jitter_sensitivity = Vec::with_capacity(readings.len());
-        for at in starts.iter().flat_map(|start| *start..start + WINDOW) {
+        for at in starts.iter().flat_map(|start| *start..start + WINDOW_PERIODS) {
             jitter_sensitivity.extend(
                 outputs.iter().map(|(axis, channel)| jitter_sensitivity_of(record, at, *axis, *channel)),
             );
@@ -112,7 +113,7 @@ impl<'a> Windows<'a> {
 
     /// Length of the residual vector of a window.
     pub(crate) fn rows(&self) -> usize {
-        WINDOW * self.outputs.len()
+        WINDOW_PERIODS * self.outputs.len()
     }
 
     /// Whether the residuals of the axes have nothing to do with each other: both are measured, and their rods are not linked.
@@ -175,14 +176,14 @@ impl<'a> Windows<'a> {
         let mut batch = Batch::new(plants);
         let mut next = 0;
         // Unjudged windows are simulated as well, since internal states continue.
-        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
+        for start in (0..self.record.len() / WINDOW_PERIODS).map(|window| window * WINDOW_PERIODS) {
             for (at, inverse) in inverse.iter().enumerate() {
-                let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
+                let points = inverse.points(self.record, start, &self.points[start / WINDOW_PERIODS]);
                 set_state(batch.plant_mut(at), self.record, start, &points);
             }
             let judged = self.starts.get(next) == Some(&start);
             next += usize::from(judged);
-            for inputs in &self.record.inputs[start..start + WINDOW] {
+            for inputs in &self.record.inputs[start..start + WINDOW_PERIODS] {
                 if judged {
                     self.read_each(&batch, inputs, &mut simulated);
                 }

@@ -9,7 +9,7 @@ use super::fit::Fitting;
 use super::record::MeasuredRecord;
 
 /// Blocks of time of each record.
-const BLOCKS: usize = 10;
+const BLOCKS_PER_RECORD: usize = 10;
 /// Bands of what folds go over beside the time.
 const BANDS: usize = 5;
 
@@ -24,11 +24,11 @@ pub(crate) struct RowBlocks {
 impl Fitting<'_> {
     /// Each record in blocks of time.
     pub(crate) fn blocks_in_time(&self) -> RowBlocks {
-        let blocks = BLOCKS * self.records.len();
+        let blocks = BLOCKS_PER_RECORD * self.records.len();
         let of_record = |(record, measured): (usize, &MeasuredRecord)| {
             let rows = self.rows(record);
             let block = |row: usize| match measured.is_judged[row] && rows.contains(&row) {
-                true => record * BLOCKS + (row - rows.start) * BLOCKS / rows.len(),
+                true => record * BLOCKS_PER_RECORD + (row - rows.start) * BLOCKS_PER_RECORD / rows.len(),
                 false => blocks,
             };
             (0..measured.time_s.len()).map(block).collect()

@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Cycles over which the begin of cycles is estimated from stamps.
-const BLOCK: u64 = 1000;
+const BLOCK_CYCLES: u64 = 1000;
 /// Commands that arrive so shortly before an estimated begin may have come after the true one: the rig samples meanwhile.
 const MARGIN_NS: u64 = 100_000;
 /// A longer hole is no hole in a record but two records; and a wrong stamp would make rows out of years.
@@ -93,7 +93,7 @@ impl CycleStarts {
         for (logged, cycle) in log.iter().zip(&cycles.of) {
             let Some(cycle) = cycle else { continue };
             let zero_ns = logged.stamp_ns.saturating_sub(cycle * CYCLE_NS);
-            let block = blocks.entry(cycle / BLOCK).or_insert(zero_ns);
+            let block = blocks.entry(cycle / BLOCK_CYCLES).or_insert(zero_ns);
             *block = zero_ns.min(*block);
         }
         // A summary of another run would put the sensors before their cycle, or far behind it.
@@ -107,7 +107,7 @@ impl CycleStarts {
         let zero_ns = match self {
             Self::Reported { zero_ns } => *zero_ns,
             Self::Estimated { blocks } => {
-                let block = cycle / BLOCK;
+                let block = cycle / BLOCK_CYCLES;
                 let near =
                     blocks.range(block.saturating_sub(1)..=block + 1).map(|(_, zero_ns)| *zero_ns).min();
                 // A block without sensors takes the last one that has them.

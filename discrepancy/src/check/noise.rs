@@ -15,9 +15,9 @@
 use model_fit::stats::median;
 
 /// Samples of a block.
-const BLOCK: usize = 200;
+const BLOCK_SAMPLES: usize = 200;
 /// The same in a short record.
-const SHORT_BLOCK: usize = 75;
+const SHORT_BLOCK_SAMPLES: usize = 75;
 /// Share of the blocks that are taken as quiet at first, and how many at least.
 const QUIETEST: f64 = 0.08;
 const FEWEST: usize = 8;
@@ -38,7 +38,7 @@ struct Block {
 
 /// The noise of a series on its grid; `None` when there is too little of it or nothing but one value.
 pub(super) fn of(values: &[Option<f64>]) -> Option<f64> {
-    let length = if values.len() < 5 * BLOCK { SHORT_BLOCK } else { BLOCK };
+    let length = if values.len() < 5 * BLOCK_SAMPLES { SHORT_BLOCK_SAMPLES } else { BLOCK_SAMPLES };
     let mut blocks: Vec<Block> = (0..values.len().saturating_sub(length - 1))
         .step_by(length / 2)
         .filter_map(|from| block(&values[from..from + length]))

@@ -22,7 +22,7 @@
 use super::noise_colour::ar1_coefficients;
 use super::regime::Regimes;
 use super::simulated::{Perturbation, Readings, RecordFollower};
-use super::{UnknownPoint, UnknownSeries, VARIABLES, WINDOW, linkage};
+use super::{SHORT_WINDOW_PERIODS, UnknownPoint, UnknownSeries, VARIABLES, linkage};
 use crate::gridded_record::memory::Memory;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 use crate::unknown_inputs::NORMAL_LITRES_PER_MINUTE;
@@ -91,7 +91,7 @@ const OBSERVABLE_RATIO: f64 = 0.1;
 /// Largest asymmetry of the response to a perturbation and its opposite.
 const KINK: f64 = 0.2;
 /// Windows skipped at the start and after a gap, in which memories fill [rig-model.md: judged after 0.1 s].
-const FILLING: usize = 5;
+const FILLING_SHORT_WINDOWS: usize = 5;
 /// Threshold of significant offsets of the force sensor.
 const OFFSET_OVER_NOISE: f64 = 1.15;
 
@@ -155,11 +155,11 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
     let mut solved: [Vec<SolvedWindow>; 2] = [Vec::new(), Vec::new()];
     let mut filled = 0;
     // The last window needs one more period.
-    for window in 0..(gridded.len() - 1) / WINDOW {
-        let from = window * WINDOW;
-        let whole = !gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap);
+    for window in 0..(gridded.len() - 1) / SHORT_WINDOW_PERIODS {
+        let from = window * SHORT_WINDOW_PERIODS;
+        let whole = !gridded.excluded_periods[from..=from + SHORT_WINDOW_PERIODS].iter().any(|gap| *gap);
         filled = if whole { filled + 1 } else { 0 };
-        if filled > FILLING
+        if filled > FILLING_SHORT_WINDOWS
             && let Some(runs) = PerturbedRuns::of(&follower, from)
         {
             for axis in &axes {
@@ -173,7 +173,7 @@ pub(super) fn estimate(rig: &RigParameters, gridded: &GriddedRecord, unknowns: &
                 solved[*axis].extend(window.solve());
             }
         }
-        follower.advance(from, WINDOW);
+        follower.advance(from, SHORT_WINDOW_PERIODS);
     }
     for axis in axes {
         gather(rig, gridded, axis, &solved[axis], &mut unknowns.axes[axis]);
@@ -253,7 +253,7 @@ impl LinearisedWindow<'_> {
             let phi = self.ar1_coefficients[channel];
             let white = (1.0 - phi * phi).sqrt();
             let mut before: Option<(Theta, f64)> = None;
-            for at in 0..WINDOW {
+            for at in 0..SHORT_WINDOW_PERIODS {
                 let Some((row, residual)) = self.row(at, channel) else {
                     before = None;
                     continue;
@@ -274,14 +274,14 @@ impl LinearisedWindow<'_> {
                 }
             }
         }
-        if used < WINDOW * CHANNELS / 2 {
+        if used < SHORT_WINDOW_PERIODS * CHANNELS / 2 {
             return None;
         }
         normal.fill_upper_triangle_with_lower_triangle();
         let equations = Equations { normal, right, squares, dof: (used - COUNT) as f64, pressure };
         let bound = equations.solve(NO_OFFSET_N)?;
         let forces_n = self.runs.baseline[self.axis].iter().map(|reading| reading[FORCE]);
-        let baseline_force_n = forces_n.sum::<f64>() / WINDOW as f64;
+        let baseline_force_n = forces_n.sum::<f64>() / SHORT_WINDOW_PERIODS as f64;
         Some(SolvedWindow {
             from: self.from,
             baseline_force_n,
@@ -315,7 +315,7 @@ impl LinearisedWindow<'_> {
     fn is_smooth(&self) -> bool {
         let PerturbedRuns { baseline, opposite, .. } = self.runs;
         let (mut sum, mut difference) = (0.0, 0.0);
-        for at in 0..WINDOW {
+        for at in 0..SHORT_WINDOW_PERIODS {
             for channel in 0..CHANNELS {
                 let of = |run: &Readings| run[self.axis][at][channel] / self.noise(channel);
                 let perturbed = self.runs.perturbed(WindowUnknown::Force);
@@ -411,7 +411,7 @@ fn gather(
             }
             let scale = if kind.is_flow() { NORMAL_LITRES_PER_MINUTE } else { 1.0 };
             balances[kind.place()].push(UnknownPoint {
-                window: from / WINDOW,
+                window: from / SHORT_WINDOW_PERIODS,
                 value: number.of(&solution.theta) * scale,
                 deviation: number.of(&solution.deviation) * scale,
                 variables,
@@ -434,20 +434,23 @@ pub(crate) fn variables(
     from: usize,
     kind: UnknownKind,
 ) -> [f64; VARIABLES.len()] {
-    let states = &gridded.smoothed_states[from..from + WINDOW];
-    let n = WINDOW as f64;
-    let mean = |of: &dyn Fn(usize) -> f64| (0..WINDOW).map(of).sum::<f64>() / n;
+    let states = &gridded.smoothed_states[from..from + SHORT_WINDOW_PERIODS];
+    let n = SHORT_WINDOW_PERIODS as f64;
+    let mean = |of: &dyn Fn(usize) -> f64| (0..SHORT_WINDOW_PERIODS).map(of).sum::<f64>() / n;
     let x = mean(&|at| states[at][axis].extension_m);
     let v = mean(&|at| states[at][axis].rod_velocity_m_per_s);
     let [a, b] = [0, 1].map(|chamber| mean(&|at| states[at][axis].pressures_pa[chamber]));
     let command = |at: usize| gridded.inputs[at].valve[axis];
     let u = mean(&|at| command(from + at));
     let before = from.saturating_sub(1);
-    let rate = (command(from + WINDOW - 1) - command(before)) / (n * PERIOD_S);
-    let forces: Vec<f64> =
-        gridded.samples[from..from + WINDOW].iter().filter_map(|sample| sample[axis][FORCE]).collect();
+    let rate = (command(from + SHORT_WINDOW_PERIODS - 1) - command(before)) / (n * PERIOD_S);
+    let forces: Vec<f64> = gridded.samples[from..from + SHORT_WINDOW_PERIODS]
+        .iter()
+        .filter_map(|sample| sample[axis][FORCE])
+        .collect();
     let force = if forces.is_empty() { 0.0 } else { forces.iter().sum::<f64>() / forces.len() as f64 };
-    let end = &gridded.smoothed_states[(from + WINDOW).min(gridded.smoothed_states.len() - 1)][axis];
+    let end =
+        &gridded.smoothed_states[(from + SHORT_WINDOW_PERIODS).min(gridded.smoothed_states.len() - 1)][axis];
     let slope =
         |chamber: usize| (end.pressures_pa[chamber] - states[0][axis].pressures_pa[chamber]) / (n * PERIOD_S);
     let dp = match kind {
@@ -458,7 +461,7 @@ pub(crate) fn variables(
     let sign = if v == 0.0 { 0.0 } else { v.signum() };
     let time_s = (from as f64 + n / 2.0) * PERIOD_S;
     let remembered = |of: &dyn Fn(&Memory) -> f64| {
-        let memories = gridded.memories.get(from..from + WINDOW).unwrap_or_default();
+        let memories = gridded.memories.get(from..from + SHORT_WINDOW_PERIODS).unwrap_or_default();
         memories.iter().map(|memory| of(&memory[axis])).sum::<f64>() / n
     };
     let [fast, slow] = [0, 1].map(|time: usize| remembered(&|memory| memory.command_changes[time]));

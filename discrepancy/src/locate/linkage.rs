@@ -12,7 +12,7 @@
 use super::estimate::variables;
 use super::noise_colour::ar1_se_factor;
 use super::regime::Regimes;
-use super::{UnknownPoint, VARIABLES, WINDOW};
+use super::{SHORT_WINDOW_PERIODS, UnknownPoint, VARIABLES};
 use crate::gridded_record::GriddedRecord;
 use crate::windows::UnknownKind;
 use plant::{PERIOD_S, RigParameters};
@@ -33,17 +33,17 @@ pub(super) fn gather(
     }
     let linkage = rig.linkage();
     let least_n = TOUCHING * gridded.noise[1][1];
-    for window in 0..(gridded.len() - 1) / WINDOW {
-        let from = window * WINDOW;
-        let forces = &contact_n[from..from + WINDOW];
+    for window in 0..(gridded.len() - 1) / SHORT_WINDOW_PERIODS {
+        let from = window * SHORT_WINDOW_PERIODS;
+        let forces = &contact_n[from..from + SHORT_WINDOW_PERIODS];
         let side = forces[0].signum();
         let touching = forces.iter().all(|force| force * side > least_n);
-        if !touching || gridded.excluded_periods[from..=from + WINDOW].iter().any(|gap| *gap) {
+        if !touching || gridded.excluded_periods[from..=from + SHORT_WINDOW_PERIODS].iter().any(|gap| *gap) {
             continue;
         }
         let mut sum_n = 0.0;
         let mut count = 0.0;
-        let mut ends_m = Vec::with_capacity(WINDOW);
+        let mut ends_m = Vec::with_capacity(SHORT_WINDOW_PERIODS);
         for (at, force_n) in forces.iter().enumerate() {
             let samples = &gridded.samples[from + at];
             let (Some(drive_m), Some(load_m)) = (samples[0][0], samples[1][0]) else { continue };
@@ -52,7 +52,7 @@ pub(super) fn gather(
             sum_n += force_n - linkage.stiffness_n_per_m * (distance_m - side * 0.5 * linkage.gap_m);
             count += 1.0;
         }
-        if count < WINDOW as f64 / 2.0 {
+        if count < SHORT_WINDOW_PERIODS as f64 / 2.0 {
             continue;
         }
         let parted_m_per_s = slope(&ends_m) / PERIOD_S;
@@ -65,7 +65,7 @@ pub(super) fn gather(
         let stiff_n = linkage.stiffness_n_per_m * noise_m / n.sqrt();
         let damped_n = linkage.damping_n_s_per_m * slope_noise_m_per_s;
         let mut variables: [f64; VARIABLES.len()] = variables(gridded, 0, from, UnknownKind::Force);
-        variables[super::FORCE] = forces.iter().sum::<f64>() / WINDOW as f64;
+        variables[super::FORCE] = forces.iter().sum::<f64>() / SHORT_WINDOW_PERIODS as f64;
         points.push(UnknownPoint {
             window,
             value: sum_n / count - linkage.damping_n_s_per_m * parted_m_per_s,

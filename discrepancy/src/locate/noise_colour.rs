@@ -9,7 +9,7 @@
 //!
 //! Source: Box, Jenkins, Reinsel 2008, Time Series Analysis, 3.2.
 
-use super::WINDOW;
+use super::SHORT_WINDOW_PERIODS;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 
 /// Fewest resting windows.
@@ -26,15 +26,17 @@ const MAX_PHI: f64 = 0.95;
 /// phi of each channel of an axis.
 pub(super) fn ar1_coefficients(record: &GriddedRecord, axis: usize) -> [f64; CHANNELS] {
     let mut windows: [Vec<[f64; 2]>; CHANNELS] = Default::default();
-    for from in (0..record.len().saturating_sub(WINDOW)).step_by(WINDOW) {
+    for from in (0..record.len().saturating_sub(SHORT_WINDOW_PERIODS)).step_by(SHORT_WINDOW_PERIODS) {
         let command = |at: usize| record.inputs[at].valve[axis];
-        let since = from.saturating_sub(2 * WINDOW);
-        if !(since..from + WINDOW).all(|at| !record.excluded_periods[at] && command(at) == command(since)) {
+        let since = from.saturating_sub(2 * SHORT_WINDOW_PERIODS);
+        let is_held = |at: usize| !record.excluded_periods[at] && command(at) == command(since);
+        if !(since..from + SHORT_WINDOW_PERIODS).all(is_held) {
             continue;
         }
         for (channel, windows) in windows.iter_mut().enumerate() {
             let sample = |at: usize| record.samples[from + at][axis][channel];
-            let steps: Vec<Option<f64>> = (1..WINDOW).map(|at| Some(sample(at)? - sample(at - 1)?)).collect();
+            let steps: Vec<Option<f64>> =
+                (1..SHORT_WINDOW_PERIODS).map(|at| Some(sample(at)? - sample(at - 1)?)).collect();
             let bends: Vec<Option<f64>> = steps.windows(2).map(|pair| Some(pair[1]? - pair[0]?)).collect();
             windows.push(
                 [steps, bends].map(|differences| variance(differences.into_iter().flatten().collect())),

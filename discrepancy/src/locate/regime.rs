@@ -2,7 +2,7 @@
 //!
 //! A window is in one of hold, onset, motion-out and motion-in, and besides in near-ends and valve-edge where it is so.
 
-use super::WINDOW;
+use super::SHORT_WINDOW_PERIODS;
 use crate::gridded_record::{AxisState, GriddedRecord};
 use plant::RigParameters;
 
@@ -28,13 +28,13 @@ impl Regimes {
         let point =
             |period: usize| -> &AxisState { &record.smoothed_states[period.min(record.len() - 1)][axis] };
         let rests = |period: usize| point(period).rod_velocity_m_per_s == 0.0;
-        let hold = (from..=from + WINDOW).all(rests);
-        let onset = !hold && (from.saturating_sub(ONSET)..from + WINDOW).any(rests);
-        let out = point(from + WINDOW / 2).rod_velocity_m_per_s >= 0.0;
-        let middle_m = point(from + WINDOW / 2).extension_m;
+        let hold = (from..=from + SHORT_WINDOW_PERIODS).all(rests);
+        let onset = !hold && (from.saturating_sub(ONSET)..from + SHORT_WINDOW_PERIODS).any(rests);
+        let out = point(from + SHORT_WINDOW_PERIODS / 2).rod_velocity_m_per_s >= 0.0;
+        let middle_m = point(from + SHORT_WINDOW_PERIODS / 2).extension_m;
         let near = middle_m.min(rig.cylinder().stroke_m - middle_m) < NEAR_M;
         let command = |period: usize| record.inputs[period].valve[axis];
-        let edge = (from.saturating_sub(AFTER_EDGE).max(1)..from + WINDOW)
+        let edge = (from.saturating_sub(AFTER_EDGE).max(1)..from + SHORT_WINDOW_PERIODS)
             .any(|period| (command(period) - command(period - 1)).abs() > EDGE);
         let moving = !hold && !onset;
         Regimes { in_regime: [hold, onset, moving && out, moving && !out, near, edge] }

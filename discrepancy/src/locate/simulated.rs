@@ -8,14 +8,14 @@
 //! An unknown force acts as a hand force, without its reading by the sensor. An unknown flow is added to the stored air at the
 //! end of each period.
 
-use super::WINDOW;
+use super::SHORT_WINDOW_PERIODS;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 use crate::unknown_inputs::{add_air, pushed};
 use crate::windows::state_at;
 use plant::{Inputs, PERIOD_S, Plant, RigParameters, Setup};
 
 /// Noise-free readings of a window.
-pub(super) type Readings = [[[f64; CHANNELS]; WINDOW]; 2];
+pub(super) type Readings = [[[f64; CHANNELS]; SHORT_WINDOW_PERIODS]; 2];
 
 /// A perturbation of a window, along the extension of each axis.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,9 +65,9 @@ impl<'a> RecordFollower<'a> {
         });
         plant.go_on_in(&state_at(&plant, &points, self.record.measured)).ok()?;
         let flows = perturbation.flows_m3_per_s.iter().flatten().any(|flow| *flow != 0.0);
-        let mut read = [[[0.0; CHANNELS]; 2]; WINDOW];
+        let mut read = [[[0.0; CHANNELS]; 2]; SHORT_WINDOW_PERIODS];
         for (at, readings) in read.iter_mut().enumerate() {
-            let share = (at as f64 + 0.5) / WINDOW as f64 * 2.0 - 1.0;
+            let share = (at as f64 + 0.5) / SHORT_WINDOW_PERIODS as f64 * 2.0 - 1.0;
             let forces = [0, 1].map(|axis| perturbation.force_n[axis] + perturbation.ramp_n[axis] * share);
             let inputs = self.inputs(from + at, forces);
             // The sensor reads the contact force of the instant; the mean of both ends acts over the period.

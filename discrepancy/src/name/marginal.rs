@@ -32,7 +32,7 @@ use crate::fit::evidence::{
 use crate::parameters::COUNT;
 use crate::refit::{EffectEstimate, Refit, coordinate_columns, linearise, parameter_precisions, rig_of};
 use crate::report::{ExplanationKind, Marginal};
-use crate::windows::BLOCKS;
+use crate::windows::BLOCKS_PER_WINDOW;
 use model_fit::parallel;
 use nalgebra::DMatrix;
 use priors::{prior_of, prior_of_coordinate, prior_of_terms, scaled};
@@ -357,7 +357,7 @@ fn inputs(
                 .collect(),
         })
         .collect();
-    let mut grams = InputGrams { blocks: BLOCKS, gram: Vec::new(), cross: Vec::new() };
+    let mut grams = InputGrams { blocks: BLOCKS_PER_WINDOW, gram: Vec::new(), cross: Vec::new() };
     let mut from = 0;
     for part in &engine.windows {
         let to = from + part.count() * part.rows();

@@ -27,8 +27,8 @@ use plant::{Inputs, Plant, RigParameters, State, Truth};
 
 /// Model error as a share of the signature: 25 = (1 - 0.95^2) / e^2.
 const MODEL_ERROR: f64 = 1.0 / 16.0;
-/// Periods of a window.
-const WINDOW: usize = 100;
+/// Periods of a window here, shorter than one of the fits ([`crate::windows::WINDOW_PERIODS`]).
+const DESIGN_WINDOW_PERIODS: usize = 100;
 /// Speed below which a piston is at rest, m/s: bristles creep.
 const REST_M_PER_S: f64 = 1e-5;
 /// Relative length below which an orthogonalised direction is rounding.
@@ -144,13 +144,13 @@ impl<'a> Observer<'a> {
     }
 
     fn windows(&self) -> usize {
-        self.driven.inputs.len() / WINDOW
+        self.driven.inputs.len() / DESIGN_WINDOW_PERIODS
     }
 
     /// Start states of a window, with creep set to rest, as in the workflow: friction then holds the piston in both directions. A
     /// piston still sliding would respond to one sign of a perturbation only.
     fn points(&self, window: usize) -> [AxisState; 2] {
-        self.driven.points[window * WINDOW].map(|point| {
+        self.driven.points[window * DESIGN_WINDOW_PERIODS].map(|point| {
             let creeps = point.rod_velocity_m_per_s.abs() < REST_M_PER_S;
             if creeps { AxisState { rod_velocity_m_per_s: 0.0, ..point } } else { point }
         })
@@ -163,7 +163,7 @@ impl<'a> Observer<'a> {
 
     /// Readings of a window.
     fn rows(&self) -> usize {
-        WINDOW * self.width()
+        DESIGN_WINDOW_PERIODS * self.width()
     }
 
     fn run(&self, rig: &RigParameters) -> ObservedRun {
@@ -181,8 +181,8 @@ impl<'a> Observer<'a> {
     /// Steps through a window and appends its readings.
     fn read(&self, plant: &mut Plant, window: usize, readings: &mut Vec<f64>, jumps: &mut Vec<bool>) {
         let from = jumps.len();
-        let mut phases = Vec::with_capacity(WINDOW + 1);
-        for inputs in &self.driven.inputs[window * WINDOW..][..WINDOW] {
+        let mut phases = Vec::with_capacity(DESIGN_WINDOW_PERIODS + 1);
+        for inputs in &self.driven.inputs[window * DESIGN_WINDOW_PERIODS..][..DESIGN_WINDOW_PERIODS] {
             let truth = plant.truth(inputs);
             let shown = plant.noise_free_readings(&truth);
             for axis in &self.measured {
@@ -195,7 +195,7 @@ impl<'a> Observer<'a> {
         phases.push([phase(&end, 0), phase(&end, 1)]);
         jumps.resize(readings.len(), false);
         for (output, axis) in self.measured.iter().enumerate() {
-            for at in 0..WINDOW {
+            for at in 0..DESIGN_WINDOW_PERIODS {
                 let now = phases[at][*axis];
                 let jump = phases[at.saturating_sub(1)][*axis] != now || phases[at + 1][*axis] != now;
                 jumps[from + at * self.width() + output * CHANNELS + FORCE] = jump;

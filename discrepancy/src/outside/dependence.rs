@@ -17,7 +17,7 @@ use model_fit::stats::mean_and_variance;
 /// Circular shifts.
 pub(crate) const SHIFTS: usize = 200;
 /// Windows of a block of a fold: 0.2 s, so that both folds see each stroke in all its parts.
-const BLOCK: usize = 10;
+const BLOCK_SHORT_WINDOWS: usize = 10;
 /// Bins to each side of a pair.
 const PAIR_BINS: usize = 6;
 
@@ -74,7 +74,7 @@ impl Sample {
             values: points.iter().map(|point| point.value).collect(),
             weights: points.iter().map(|point| point.deviation.powi(-2)).collect(),
             variables: points.iter().map(|point| point.variables).collect(),
-            folds: points.iter().map(|point| (point.window / BLOCK) % 2).collect(),
+            folds: points.iter().map(|point| (point.window / BLOCK_SHORT_WINDOWS) % 2).collect(),
         }
     }
 

@@ -7,7 +7,7 @@ use plant::{Axis, PERIOD_S, Plant, RigParameters};
 use std::collections::BTreeMap;
 
 /// Periods that are not judged: internal states and lags fill [rig-model.md, Accuracy].
-const FILLING: usize = 100;
+const FILLING_PERIODS: usize = 100;
 /// Pressure that air from the supply does not exceed by much in a chamber, over the supply's.
 const HIGHEST: f64 = 1.1;
 /// How far a rod may be beyond its stops, m: rounding.
@@ -53,7 +53,7 @@ pub(super) fn free_run(record: &GriddedRecord, rig: &RigParameters) -> FreeRun {
                 let Some(sample) = samples[i][at] else { continue };
                 let range = &mut ranges[i][at];
                 *range = [range[0].min(sample), range[1].max(sample)];
-                if period >= FILLING {
+                if period >= FILLING_PERIODS {
                     let (sum, count) = &mut errors[i][at];
                     *sum += (shown[i][at] - sample).powi(2);
                     *count += 1;

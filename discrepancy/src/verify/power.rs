@@ -2,7 +2,7 @@
 
 use super::VARIANCE_FACTOR_BOUNDS;
 use super::null_power::NullPower;
-use crate::windows::WINDOW;
+use crate::windows::WINDOW_PERIODS;
 use model_fit::stats::order_statistic;
 
 /// Share of trimmed windows.
@@ -34,8 +34,8 @@ pub(super) struct Power {
 
 /// Sums of squares of each window and output.
 pub(super) fn sums(residual: &[f64], outputs: usize) -> Vec<f64> {
-    let mut sums = Vec::with_capacity(residual.len() / WINDOW);
-    for window in residual.chunks_exact(WINDOW * outputs) {
+    let mut sums = Vec::with_capacity(residual.len() / WINDOW_PERIODS);
+    for window in residual.chunks_exact(WINDOW_PERIODS * outputs) {
         let output = |output: usize| {
             window.iter().skip(output).step_by(outputs).map(|value| value * value).sum::<f64>()
         };
@@ -145,7 +145,7 @@ pub(super) fn pooled(squares: &[Squares], kept: &[bool]) -> f64 {
 /// Lag-1 autocorrelation of an output in the remaining windows.
 pub(super) fn neighbours(residual: &[f64], output: usize, outputs: usize, kept: &[bool]) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
-    for (window, _) in residual.chunks_exact(WINDOW * outputs).zip(kept).filter(|(_, kept)| **kept) {
+    for (window, _) in residual.chunks_exact(WINDOW_PERIODS * outputs).zip(kept).filter(|(_, kept)| **kept) {
         let series: Vec<f64> = window.iter().skip(output).step_by(outputs).copied().collect();
         products += series.windows(2).map(|pair| pair[0] * pair[1]).sum::<f64>();
         squares += series.iter().map(|value| value * value).sum::<f64>();

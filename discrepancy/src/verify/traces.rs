@@ -2,7 +2,7 @@
 
 use super::{Model, column};
 use crate::page::Trace;
-use crate::windows::WINDOW;
+use crate::windows::WINDOW_PERIODS;
 use plant::{Axis, PERIOD_S};
 
 /// One trace for each output, over the whole record; what no window has is NaN.
@@ -20,8 +20,8 @@ pub(super) fn traces(before: &Model<'_>, after: &Model<'_>) -> Vec<Trace> {
             let offset = if *at == 0 && Axis::ALL[*axis] == Axis::Load { load_offset_m } else { 0.0 };
             let joined = |values: &[f64], offset: f64| {
                 let mut series = vec![f64::NAN; record.len()];
-                for (start, window) in windows.starts.iter().zip(values.chunks_exact(WINDOW * outputs.len()))
-                {
+                let of_windows = values.chunks_exact(WINDOW_PERIODS * outputs.len());
+                for (start, window) in windows.starts.iter().zip(of_windows) {
                     let output = window.iter().skip(output).step_by(outputs.len());
                     series[*start..]
                         .iter_mut()

@@ -9,16 +9,16 @@
 //! the force sensor is added to its reading. Source: discrepancy-notes.md, Second reading (Kennedy, O'Hagan 2001).
 
 use super::whiten::SPIKE;
-use super::{COARSE_SUBSTEPS, FORCE, WINDOW, Windows, dot, project, set_state};
+use super::{COARSE_SUBSTEPS, FORCE, WINDOW_PERIODS, Windows, dot, project, set_state};
 use crate::sensor_inverse::SensorInverse;
 use crate::unknown_inputs::{NORMAL_LITRES_PER_MINUTE, add_air, pushed};
 use model_fit::parallel;
 use nalgebra::DMatrix;
 use plant::{Inputs, Plant, RigParameters};
 
-/// Periods of a block; a window has [`BLOCKS`].
-pub(crate) const BLOCK: usize = 20;
-pub(crate) const BLOCKS: usize = WINDOW / BLOCK;
+/// Periods of a block; a window has [`BLOCKS_PER_WINDOW`].
+pub(crate) const BLOCK_PERIODS: usize = 20;
+pub(crate) const BLOCKS_PER_WINDOW: usize = WINDOW_PERIODS / BLOCK_PERIODS;
 /// Steps of finite differences: 1 Nl/min and 1 N, the units of the columns.
 const STEP: f64 = 1.0;
 
@@ -111,45 +111,46 @@ impl Windows<'_> {
         let mut plant = self.plant(rig).with_substeps(COARSE_SUBSTEPS);
         let inverse = SensorInverse::of(rig);
         let mut plants = Vec::with_capacity(self.starts.len());
-        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
-            let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
+        for start in (0..self.record.len() / WINDOW_PERIODS).map(|window| window * WINDOW_PERIODS) {
+            let points = inverse.points(self.record, start, &self.points[start / WINDOW_PERIODS]);
             set_state(&mut plant, self.record, start, &points);
             if self.starts.get(plants.len()) == Some(&start) {
                 plants.push(plant.clone());
             }
-            self.record.inputs[start..start + WINDOW].iter().for_each(|inputs| plant.step(inputs));
+            self.record.inputs[start..start + WINDOW_PERIODS].iter().for_each(|inputs| plant.step(inputs));
         }
         plants
     }
 
     /// The responses of window `at` to each input and block of an axis.
     fn responses(&self, at: usize, plant: &Plant, axis: usize) -> Option<Vec<Vec<f64>>> {
-        let inputs = &self.record.inputs[self.starts[at]..][..WINDOW];
+        let inputs = &self.record.inputs[self.starts[at]..][..WINDOW_PERIODS];
         let width = self.outputs.len();
         // The straight run, and the plant at the start of each block.
         let mut straight = Vec::with_capacity(self.rows());
-        let mut plants = Vec::with_capacity(BLOCKS);
+        let mut plants = Vec::with_capacity(BLOCKS_PER_WINDOW);
         let mut plant = plant.clone();
         for (period, inputs) in inputs.iter().enumerate() {
-            if period % BLOCK == 0 {
+            if period % BLOCK_PERIODS == 0 {
                 plants.push(plant.clone());
             }
             self.read(&plant, inputs, &mut straight);
             plant.step(inputs);
         }
         let force_output = self.outputs.iter().position(|output| *output == (axis, FORCE));
-        let mut all = Vec::with_capacity(UnknownKind::ALL.len() * BLOCKS);
+        let mut all = Vec::with_capacity(UnknownKind::ALL.len() * BLOCKS_PER_WINDOW);
         for kind in UnknownKind::ALL {
             for (block, plant) in plants.iter().enumerate() {
-                let from = block * BLOCK * width;
+                let from = block * BLOCK_PERIODS * width;
                 let mut response = vec![0.0; self.rows()];
                 if kind == UnknownKind::ForceSensor {
                     if let Some(output) = force_output {
                         let reading = STEP / self.record.noise[axis][FORCE];
-                        (0..BLOCK).for_each(|period| response[from + period * width + output] = reading);
+                        (0..BLOCK_PERIODS)
+                            .for_each(|period| response[from + period * width + output] = reading);
                     }
                 } else {
-                    let changed = self.run_block(plant, &inputs[block * BLOCK..], axis, kind)?;
+                    let changed = self.run_block(plant, &inputs[block * BLOCK_PERIODS..], axis, kind)?;
                     for ((value, changed), straight) in
                         response[from..].iter_mut().zip(changed).zip(&straight[from..])
                     {
@@ -181,7 +182,7 @@ impl Windows<'_> {
             UnknownKind::ForceSensor => {}
         }
         for (period, inputs) in inputs.iter().enumerate() {
-            let acts = period < BLOCK;
+            let acts = period < BLOCK_PERIODS;
             let inputs = if acts { pushed(*inputs, forces_n) } else { *inputs };
             let from = readings.len();
             self.read(&plant, &inputs, &mut readings);

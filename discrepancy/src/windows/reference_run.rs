@@ -8,7 +8,7 @@
 //! A point of a table acts between its neighbours only, so that half of the windows or more do not depend on it. The state of a
 //! rig without effects holds all of its past.
 
-use super::{COARSE_SUBSTEPS, WINDOW, Windows};
+use super::{COARSE_SUBSTEPS, WINDOW_PERIODS, Windows};
 use crate::sensor_inverse::SensorInverse;
 use plant::effects::tabulated::Variable;
 use plant::{Axis, Plant, RigParameters, State};
@@ -59,13 +59,13 @@ impl Windows<'_> {
         let remembers = !(rig.effects().is_empty() && rig.terms().is_empty());
         let mut reference_run =
             ReferenceRun { simulated: Vec::with_capacity(self.readings.len()), ..ReferenceRun::default() };
-        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
-            let points = inverse.points(self.record, start, &self.points[start / WINDOW]);
+        for start in (0..self.record.len() / WINDOW_PERIODS).map(|window| window * WINDOW_PERIODS) {
+            let points = inverse.points(self.record, start, &self.points[start / WINDOW_PERIODS]);
             super::set_state(&mut plant, self.record, start, &points);
             let judged = self.starts.get(reference_run.ranges_of_windows.len()) == Some(&start);
             let state = *plant.state();
             let mut ranges = VariableRanges::EMPTY;
-            for inputs in &self.record.inputs[start..start + WINDOW] {
+            for inputs in &self.record.inputs[start..start + WINDOW_PERIODS] {
                 if judged {
                     self.read(&plant, inputs, &mut reference_run.simulated);
                     ranges.add(&plant);
@@ -108,7 +108,7 @@ impl Windows<'_> {
                 continue;
             }
             plant.go_on_in(state).expect("a state of a rig is one of its neighbour's");
-            for inputs in &self.record.inputs[*start..start + WINDOW] {
+            for inputs in &self.record.inputs[*start..start + WINDOW_PERIODS] {
                 self.read(&plant, inputs, &mut simulated);
                 plant.step(inputs);
             }

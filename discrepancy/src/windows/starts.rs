@@ -1,7 +1,7 @@
 //! Start states of windows: their sensitivities, and their estimation.
 
 use super::whiten::gaussian;
-use super::{COARSE_SUBSTEPS, WINDOW, Windows, dot, project};
+use super::{COARSE_SUBSTEPS, WINDOW_PERIODS, Windows, dot, project};
 use crate::gridded_record::{AxisState, GriddedRecord};
 use nalgebra::{DMatrix, DVector};
 use plant::{Batch, Inputs, Plant, RigParameters, Setup, State};
@@ -62,7 +62,7 @@ impl Windows<'_> {
         for slide_m_per_s in SLIDES_M_PER_S {
             let points = self.points.clone();
             for start in &self.starts {
-                for point in &mut self.points[start / WINDOW] {
+                for point in &mut self.points[start / WINDOW_PERIODS] {
                     let rests = point.rod_velocity_m_per_s == 0.0;
                     let other = point.alternative_velocity_m_per_s.or(rests.then_some(slide_m_per_s));
                     point.rod_velocity_m_per_s = other.unwrap_or(point.rod_velocity_m_per_s);
@@ -79,7 +79,7 @@ impl Windows<'_> {
                 if new < *old - MIN_CHI2_DROP {
                     *old = new;
                 } else {
-                    self.points[start / WINDOW] = points[start / WINDOW];
+                    self.points[start / WINDOW_PERIODS] = points[start / WINDOW_PERIODS];
                 }
             }
         }
@@ -101,7 +101,7 @@ impl Windows<'_> {
             let windows = left.chunks_exact_mut(rows).zip(new.chunks_exact(rows));
             for ((left, new), (start, share)) in windows.zip(self.starts.iter().zip(&mut shares)) {
                 if dot(new, new) > dot(left, left) {
-                    self.points[start / WINDOW] = points[start / WINDOW];
+                    self.points[start / WINDOW_PERIODS] = points[start / WINDOW_PERIODS];
                     *share *= SHORTER;
                 } else {
                     left.copy_from_slice(new);
@@ -134,7 +134,7 @@ impl Windows<'_> {
                         * (moved[place * AxisState::PERTURBATIONS.len() + number] * PRIOR_STD[number])
                             .clamp(-most, most)
                 };
-                let point = &mut self.points[self.starts[at] / WINDOW][*axis];
+                let point = &mut self.points[self.starts[at] / WINDOW_PERIODS][*axis];
                 point.extension_m += part(0);
                 // A piston at rest stays at rest: a speed would only let it slide and stick again.
                 if point.rod_velocity_m_per_s != 0.0 {
@@ -166,7 +166,7 @@ impl Windows<'_> {
         }
         self.points = points;
         for (start, shift_m) in self.starts.iter().zip(best) {
-            for point in &mut self.points[start / WINDOW] {
+            for point in &mut self.points[start / WINDOW_PERIODS] {
                 point.extension_m += 0.5 * shift_m;
             }
         }
@@ -191,8 +191,9 @@ impl Windows<'_> {
     ) -> Self {
         let noise = self.raw_noise(random);
         let readings = simulated.iter().zip(&noise).map(|(value, noise)| value + noise).collect();
-        let points =
-            (0..self.points.len()).map(|window| self.record.smoothed_states[window * WINDOW]).collect();
+        let points = (0..self.points.len())
+            .map(|window| self.record.smoothed_states[window * WINDOW_PERIODS])
+            .collect();
         let mut windows = Windows { points, readings, ..self.clone() };
         windows.estimate_starts_by(START_PASSES, |_| Cow::Borrowed(sensitivities));
         windows
@@ -253,9 +254,9 @@ impl Windows<'_> {
         let rows = self.rows();
         let perturbations = self.perturbations();
         let mut all: Vec<Vec<Vec<f64>>> = Vec::with_capacity(self.starts.len());
-        for start in (0..self.record.len() / WINDOW).map(|window| window * WINDOW) {
+        for start in (0..self.record.len() / WINDOW_PERIODS).map(|window| window * WINDOW_PERIODS) {
             let judged = self.starts.get(all.len()) == Some(&start);
-            let points = self.points[start / WINDOW];
+            let points = self.points[start / WINDOW_PERIODS];
             set_state(&mut plant, self.record, start, &points);
             let mut plants = vec![plant];
             for (axes, number) in perturbations.iter().filter(|_| judged) {
@@ -267,7 +268,7 @@ impl Windows<'_> {
             }
             let mut read = vec![Vec::with_capacity(rows); plants.len()];
             let mut batch = Batch::new(plants);
-            for inputs in &self.record.inputs[start..start + WINDOW] {
+            for inputs in &self.record.inputs[start..start + WINDOW_PERIODS] {
                 self.read_each(&batch, inputs, &mut read);
                 batch.step_alike(inputs);
             }

@@ -1,6 +1,6 @@
 //! Noise model: force spikes, sampling jitter, autocorrelated noise, and draws of it.
 
-use super::{FORCE, WINDOW, Windows, dot};
+use super::{FORCE, WINDOW_PERIODS, Windows, dot};
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 use model_fit::stats::median;
 use plant::PERIOD_S;
@@ -72,7 +72,7 @@ impl Windows<'_> {
             if lag1_autocorrelation == 0.0 {
                 continue;
             }
-            for period in (1..WINDOW).rev() {
+            for period in (1..WINDOW_PERIODS).rev() {
                 let (place, before) = (period * width + output, (period - 1) * width + output);
                 if !(self.valid[at * self.rows() + place] && self.valid[at * self.rows() + before]) {
                     continue;
