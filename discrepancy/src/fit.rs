@@ -25,7 +25,7 @@ use std::sync::Arc;
 /// Passes of reweighting.
 const PASSES: usize = 12;
 /// Fall of the loss below which it has converged.
-const CONVERGED: f64 = 1e-3;
+const ABSOLUTE_TOLERANCE: f64 = 1e-3;
 
 /// Lower bound of the chi2 per degree of freedom of a window.
 pub(crate) const LEAST: f64 = 1e-3;
@@ -288,7 +288,7 @@ impl Products {
             if tried_loss >= loss {
                 break;
             }
-            let converged = loss - tried_loss < CONVERGED;
+            let converged = loss - tried_loss < ABSOLUTE_TOLERANCE;
             (coefficients, squares, loss) = (tried, tried_squares, tried_loss);
             weights = self.weights(&squares);
             if converged {

@@ -46,7 +46,7 @@ use gauss_newton::{fit_selected, shrink_parameters};
 use heterogeneity::{
     Heterogeneity, eliminate_heterogeneous, heterogeneity, parameter_spread, prefer_homogeneous, prefer_large,
 };
-use model_fit::estimator::RELINEARISED;
+use model_fit::estimator::RELINEARISATION;
 use model_fit::parallel;
 pub(crate) use needed_parameters::significantly_off;
 use needed_parameters::with_needed;
@@ -284,7 +284,7 @@ pub(crate) fn on_all(engine: &Engine<'_>, found: &mut SelectionResult) {
 
 /// Refits a model with sensitivities relinearised at itself.
 fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
-    crate::refit::relinearise(engine, model, RELINEARISED)
+    crate::refit::relinearise(engine, model, RELINEARISATION)
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.

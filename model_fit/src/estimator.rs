@@ -25,9 +25,9 @@ pub struct Options {
     pub steps: usize,
     /// Fall of the loss in a step below which the fit has converged. The loss is minus twice a log-likelihood, so that a
     /// parameter off by one standard error costs 1; the tolerances are below what decides between two models.
-    pub converged: f64,
+    pub absolute_tolerance: f64,
     /// The same as a share of the loss: where no model is exact, the last steps decide nothing. The larger of the two holds.
-    pub converged_share: f64,
+    pub relative_tolerance: f64,
     /// Fractions of the step that are tried, longest first.
     pub fractions: &'static [f64],
 }
@@ -36,34 +36,38 @@ pub struct Options {
 const SHORTER: f64 = 0.4;
 const SHORTER_TWICE: f64 = SHORTER * SHORTER;
 /// Share of the loss of an inexact model that decides nothing: fits are alike within twenty times as much.
-const OF_INEXACT: f64 = 1e-3;
+const INEXACT_TOLERANCE: f64 = 1e-3;
 
 /// A candidate beside fixed parameter sensitivities. A step that is still too long at the last fraction crosses a break-away.
 pub const CANDIDATE: Options = Options {
     steps: 7,
-    converged: 0.3,
-    converged_share: OF_INEXACT,
+    absolute_tolerance: 0.3,
+    relative_tolerance: INEXACT_TOLERANCE,
     fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER],
 };
 /// All numbers of a model, with one fraction more: this is the model that is reported.
 pub const JOINT: Options = Options {
     steps: 6,
-    converged: 0.3,
-    converged_share: 0.1 * OF_INEXACT,
+    absolute_tolerance: 0.3,
+    relative_tolerance: 0.1 * INEXACT_TOLERANCE,
     fractions: &[1.0, SHORTER, SHORTER_TWICE, SHORTER_TWICE * SHORTER, SHORTER_TWICE * SHORTER_TWICE],
 };
 /// The same for models that are compared and not reported.
-pub const JOINT_COMPARED: Options = Options { converged_share: OF_INEXACT, ..JOINT };
+pub const JOINT_COMPARED: Options = Options { relative_tolerance: INEXACT_TOLERANCE, ..JOINT };
 /// Tables: each step is some [`TABLES_WITHIN`] with the same derivatives, which cost many times a step.
-pub const TABLES: Options =
-    Options { steps: 7, converged: 1.0, converged_share: OF_INEXACT, fractions: &[1.0, 0.4, 0.15, 0.05] };
+pub const TABLES: Options = Options {
+    steps: 7,
+    absolute_tolerance: 1.0,
+    relative_tolerance: INEXACT_TOLERANCE,
+    fractions: &[1.0, 0.4, 0.15, 0.05],
+};
 /// The same with the derivatives held.
 pub const TABLES_WITHIN: Options = Options { steps: 3, ..TABLES };
 /// New linearisations of the parameters beside a candidate: those of a model that has an effect differ from the rig file's.
-pub const RELINEARISED: Options =
-    Options { steps: 4, converged: 1.0, converged_share: OF_INEXACT, fractions: &[1.0] };
+pub const RELINEARISATION: Options =
+    Options { steps: 4, absolute_tolerance: 1.0, relative_tolerance: INEXACT_TOLERANCE, fractions: &[1.0] };
 /// New linearisations of the parameters alone, from the rig file's values to a supply or a mass that is a tenth off.
-pub const CALIBRATION: Options = Options { steps: 7, ..RELINEARISED };
+pub const CALIBRATION: Options = Options { steps: 7, ..RELINEARISATION };
 
 /// A model simulated at one set of its numbers.
 pub trait Iterate {
@@ -101,7 +105,7 @@ impl Estimator {
 
     /// Fall of this loss below which a fit has converged.
     pub fn tolerance(&self, loss: f64) -> f64 {
-        self.options.converged.max(self.options.converged_share * loss)
+        self.options.absolute_tolerance.max(self.options.relative_tolerance * loss)
     }
 
     /// The longest fraction of a step that lowers the loss; `at` simulates a fraction.
@@ -189,8 +193,12 @@ mod tests {
         }
     }
 
-    const OPTIONS: Options =
-        Options { steps: 20, converged: 1e-6, converged_share: 0.0, fractions: &[1.0, 0.5, 0.25] };
+    const OPTIONS: Options = Options {
+        steps: 20,
+        absolute_tolerance: 1e-6,
+        relative_tolerance: 0.0,
+        fractions: &[1.0, 0.5, 0.25],
+    };
 
     /// Newton's method with a slope and a curvature that belong to the loss, or do not.
     fn fitted(
@@ -238,9 +246,9 @@ mod tests {
 
     #[test]
     fn of_a_large_loss_a_share_is_the_tolerance() {
-        let from = |start: f64, converged_share: f64| {
+        let from = |start: f64, relative_tolerance: f64| {
             let loss = |x: f64| 1000.0 + (x - 3.0).powi(2);
-            let options = Options { converged_share, ..OPTIONS };
+            let options = Options { relative_tolerance, ..OPTIONS };
             let halfway = |estimator: &mut Estimator, at: &ScalarIterate| {
                 estimator.backtrack(at, 1.0, &[1.0], |_| Some(ScalarIterate(3.0 + 0.5 * (at.0 - 3.0), loss)))
             };

@@ -21,12 +21,12 @@ use nalgebra::{DMatrix, DVector};
 /// along it there are some decades.
 pub(super) const OPTIONS: Options = Options {
     steps: 80,
-    converged: 0.1,
-    converged_share: 0.0,
+    absolute_tolerance: 0.1,
+    relative_tolerance: 0.0,
     fractions: &[1.0, 0.999_999, 0.999_99, 0.9999, 0.999, 0.99, 0.9, 0.6, 0.25, 0.1, 0.03, 0.01, 1e-3, 1e-4],
 };
 /// What a sample adds to the fall of the loss that counts: a change of the residual by half of it, relatively.
-const CONVERGED_PER_SAMPLE: f64 = 1e-4;
+const TOLERANCE_PER_SAMPLE: f64 = 1e-4;
 /// Share of the predicted reduction of the loss from which a step is taken without another.
 const SUFFICIENT_REDUCTION_RATIO: f64 = 0.75;
 /// Noise of an output is at least this share of its size: a fit that leaves nothing has no likelihood.
@@ -431,8 +431,8 @@ impl<'a> Fitting<'a> {
         let start = self.at(start)?;
         let here = self.near(&start);
         let samples: f64 = (0..self.model.outputs.len()).map(|output| self.count(output)).sum();
-        let converged = OPTIONS.converged + CONVERGED_PER_SAMPLE * samples;
-        let options = Options { steps, converged, ..OPTIONS };
+        let absolute_tolerance = OPTIONS.absolute_tolerance + TOLERANCE_PER_SAMPLE * samples;
+        let options = Options { steps, absolute_tolerance, ..OPTIONS };
         let cut = self.blocks_in_time();
         Ok(Estimator::new(options).descend(start, |estimator, point| {
             let Ok(normals) = here.normals(&point.values_si, &cut) else { return Step::Impossible };

@@ -151,7 +151,7 @@ impl Fitting<'_> {
         for (round, (_, kept)) in ROUNDS.iter().enumerate() {
             begun.sort_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
             // Starts that have come to the same minimum go on once.
-            begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.converged);
+            begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.absolute_tolerance);
             begun.truncate(*kept);
             let steps = ROUNDS.get(round + 1).map_or(most, |(steps, _)| *steps);
             begun = begun.into_iter().map(|one| further(one, steps)).collect::<Result<_, _>>()?;
@@ -228,7 +228,7 @@ fn without_effect(fitting: &Fitting<'_>, suspect: usize, first: &[f64], loss: f6
         })
     });
     let is_as_low = |values: &Vec<f64>| {
-        fitting.at(values.clone()).is_ok_and(|point| point.loss <= loss + OPTIONS.converged)
+        fitting.at(values.clone()).is_ok_and(|point| point.loss <= loss + OPTIONS.absolute_tolerance)
     };
     candidates.into_iter().find(is_as_low)
 }

@@ -34,8 +34,8 @@ const SEARCHED_SHARE: f64 = 0.5;
 const MOST_SHORTFALL: f64 = 0.2;
 /// Those amplitudes.
 const AMPLITUDES: [f64; 6] = [0.05, 0.12, 0.25, 0.45, 0.7, 1.0];
-/// Number of contenders that are relinearised.
-const RELINEARISED: usize = 3;
+/// Maximum number of fits of a round that are relinearised.
+const MAX_RELINEARISED_FITS: usize = 3;
 /// Share of the best gain after one new linearisation below which a fit has no further ones. Names and verdicts of 12 draws of
 /// seed 1403356004951295, a development seed by then, stayed the same.
 const MAY_BE_BEST: f64 = 0.8;
@@ -164,8 +164,8 @@ impl<'a> SelectionRound<'a> {
         // These fits used the sensitivities of the model without the effect; the best are relinearised. Gains compare with the
         // null loss of the same sensitivities.
         let gain = loss_before - fits.first()?.loss;
-        let near =
-            fits.iter().take(RELINEARISED).filter(|fit| loss_before - fit.loss >= 0.5 * gain).count().max(1);
+        let is_near = |fit: &&Refit| loss_before - fit.loss >= 0.5 * gain;
+        let near = fits.iter().take(MAX_RELINEARISED_FITS).filter(is_near).count().max(1);
         let once = parallel::map(&fits[..near], |fit| relinearise_once(engine, at_best_pitch(engine, fit)));
         let most = once.iter().map(|fit| loss_before - fit.loss).fold(0.0, f64::max);
         let restarted = parallel::map(&once, |fit| {
@@ -193,7 +193,7 @@ impl<'a> SelectionRound<'a> {
     fn refit_close_jointly(&mut self, engine: &Engine<'a>, model: &Refit) {
         let Some(best) = self.fits.first().map(|fit| fit.loss) else { return };
         let is_close = |fit: &&Refit| fit.loss - best < CLOSE * (model.loss - best);
-        let close = self.fits.iter().take(RELINEARISED).filter(is_close).count();
+        let close = self.fits.iter().take(MAX_RELINEARISED_FITS).filter(is_close).count();
         if close < 2 || engine.is_linked() {
             return;
         }

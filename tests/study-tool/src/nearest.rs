@@ -150,7 +150,7 @@ impl Fit<'_> {
 
     /// Least squares from a start; converged when the decrease is below a share of `whole`.
     pub(crate) fn nearest(&self, start: FitPoint, whole: f64) -> FitPoint {
-        let options = Options { steps: STEPS, converged: CONVERGED * whole, ..JOINT };
+        let options = Options { steps: STEPS, absolute_tolerance: CONVERGED * whole, ..JOINT };
         let (fitted, _) = Estimator::new(options).descend(start, |estimator, point| {
             let Some(step) = self.step(&point.coordinates, &point.run, &point.residual) else {
                 return Step::Impossible;

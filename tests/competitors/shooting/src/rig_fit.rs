@@ -16,8 +16,12 @@ use nalgebra::{DMatrix, DVector};
 use plant::RigParameters;
 
 /// Gauss-Newton of a model. The loss is a chi2 of some ten thousand numbers.
-const OPTIONS: Options =
-    Options { steps: 8, converged: 1.0, converged_share: 0.0, fractions: &[1.0, 0.4, 0.16, 0.06] };
+const OPTIONS: Options = Options {
+    steps: 8,
+    absolute_tolerance: 1.0,
+    relative_tolerance: 0.0,
+    fractions: &[1.0, 0.4, 0.16, 0.06],
+};
 /// The same of one that is compared with others.
 const ROUGH: Options = Options { steps: 3, ..OPTIONS };
 /// Finite differences: of a coordinate, of a factor.
