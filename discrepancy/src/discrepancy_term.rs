@@ -19,7 +19,7 @@ use crate::engine::Engine;
 use crate::fit::Products;
 use crate::gridded_record::GriddedRecord;
 use crate::locate::estimate::variables;
-use crate::locate::{self, DIRECTION, MEMORY, POSITION, PRESSURE_DIFFERENCE, VARIABLES};
+use crate::locate::{self, DIRECTION, HISTORY_COMPLEXITY, POSITION, PRESSURE_DIFFERENCE, VARIABLES};
 use crate::outside::CONSTANT;
 use crate::parameters::COUNT;
 use crate::refit::{
@@ -73,7 +73,7 @@ impl Regressor {
     }
 
     fn is_history(self) -> bool {
-        matches!(self, Regressor::Variable(at) if VARIABLES[at].complexity == MEMORY)
+        matches!(self, Regressor::Variable(at) if VARIABLES[at].complexity == HISTORY_COMPLEXITY)
     }
 
     fn names(self) -> Vec<&'static str> {

@@ -40,16 +40,16 @@ pub const VARIABLES: [WindowVariable; 19] = [
     variable("F", "N", 1, 1),
     variable("t", "s", 3, 1),
     variable("dp/dt", "Pa/s", 2, 2),
-    variable("change of u (2 ms)", "", MEMORY, 6),
-    variable("change of u (10 ms)", "", MEMORY, 6),
-    variable("last movement of u", "", MEMORY, 6),
-    variable("last movement of x", "", MEMORY, 6),
-    variable("change of p (0.1 s)", "Pa", MEMORY, 6),
-    variable("change of p (1 s)", "Pa", MEMORY, 6),
-    variable("mean |v| (1 s)", "m/s", MEMORY, 6),
+    variable("change of u (2 ms)", "", HISTORY_COMPLEXITY, 6),
+    variable("change of u (10 ms)", "", HISTORY_COMPLEXITY, 6),
+    variable("last movement of u", "", HISTORY_COMPLEXITY, 6),
+    variable("last movement of x", "", HISTORY_COMPLEXITY, 6),
+    variable("change of p (0.1 s)", "Pa", HISTORY_COMPLEXITY, 6),
+    variable("change of p (1 s)", "Pa", HISTORY_COMPLEXITY, 6),
+    variable("mean |v| (1 s)", "m/s", HISTORY_COMPLEXITY, 6),
 ];
-/// Complexity of what depends on the periods before.
-pub(crate) const MEMORY: usize = 4;
+/// Complexity of history variables, which depend on the periods before.
+pub(crate) const HISTORY_COMPLEXITY: usize = 4;
 /// Indices of some of them.
 pub(crate) const POSITION: usize = 0;
 pub(crate) const VELOCITY: usize = 1;

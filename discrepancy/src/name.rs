@@ -44,7 +44,7 @@ pub use explanations::Explanation;
 use explanations::{Fits, explanations};
 use gauss_newton::{fit_selected, shrink_parameters};
 use heterogeneity::{
-    Heterogeneity, eliminate_heterogeneous, heterogeneity, parameter_spread, prefer_homogeneous, prefer_large,
+    Heterogeneity, eliminate_heterogeneous, heterogeneity, parameter_tau, prefer_homogeneous, prefer_large,
 };
 use model_fit::estimator::RELINEARISATION;
 use model_fit::parallel;
@@ -119,7 +119,7 @@ pub struct SelectionResult {
     /// How much the windows disagree on each effect of the reported model; empty without one.
     pub(crate) heterogeneity: Vec<Heterogeneity>,
     /// tau of each parameter between the windows, of the reported model.
-    pub parameter_spread: [f64; COUNT],
+    pub parameter_tau: [f64; COUNT],
     /// Why the effects of the model are not named.
     pub not_explained: Option<NotExplained>,
     /// Whether each effect of the model has a name.
@@ -241,7 +241,7 @@ pub fn name(
     } else {
         Vec::new()
     };
-    let parameter_spread = parameter_spread(here, &at_reported, &reported).unwrap_or([0.0; COUNT]);
+    let parameter_tau = parameter_tau(here, &at_reported, &reported).unwrap_or([0.0; COUNT]);
     let with_shares = selection.model.effects.iter().zip(&shares);
     let alternatives = with_shares.map(|(effect, share)| selection.alternatives(effect, *share)).collect();
     let Selection { calibrated, model, .. } = selection;
@@ -259,7 +259,7 @@ pub fn name(
         limits,
         lacks_fit,
         heterogeneity,
-        parameter_spread,
+        parameter_tau,
         not_explained,
         is_named,
         explanations,

@@ -15,7 +15,7 @@ pub(crate) mod dependence;
 pub(crate) mod formula;
 
 use crate::locate::maps::{map, surface};
-use crate::locate::{MEMORY, TIME, UnknownSeries, VARIABLES};
+use crate::locate::{HISTORY_COMPLEXITY, TIME, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Dependence, LocatedTerm, UncataloguedTerm};
 pub(crate) use dependence::SHIFTS;
 use dependence::{Bins, Sample};
@@ -62,7 +62,8 @@ pub fn outside(
         let sample = Sample::of(series);
         let tests: Vec<_> = (0..VARIABLES.len()).map(|variable| sample.test(variable)).collect();
         // Whether there is a term is judged without history variables: more tests would find more by chance.
-        let plain = VARIABLES.iter().zip(&tests).filter(|(variable, _)| variable.complexity < MEMORY);
+        let plain =
+            VARIABLES.iter().zip(&tests).filter(|(variable, _)| variable.complexity < HISTORY_COMPLEXITY);
         let stands_out = plain.map(|(_, test)| test.2).fold(0.0, f64::max);
         let lifted = series.birge_ratio().is_some_and(|ratio| ratio > MIN_BIRGE_RATIO);
         let is_located = located.is_some_and(|located| located.balance == series.balance);
@@ -152,7 +153,9 @@ impl BalanceTests<'_> {
         for left in 0..VARIABLES.len() {
             for right in left + 1..VARIABLES.len() {
                 let is_half = |at: usize| {
-                    at != TIME && VARIABLES[at].complexity < MEMORY && self.tests[at].0 > MIN_MARGINAL_R2
+                    at != TIME
+                        && VARIABLES[at].complexity < HISTORY_COMPLEXITY
+                        && self.tests[at].0 > MIN_MARGINAL_R2
                 };
                 if !is_half(left) || !is_half(right) {
                     continue;

@@ -61,11 +61,11 @@ pub struct Refit {
 }
 
 impl Refit {
-    /// The same with the standard errors of its parameters widened by their spread between the windows.
-    pub(crate) fn widened(&self, spread: &[f64; COUNT]) -> Self {
+    /// The same with the standard errors of its parameters widened by tau, their standard deviation between the windows.
+    pub(crate) fn widened(&self, tau: &[f64; COUNT]) -> Self {
         let mut wider = self.clone();
         let from = wider.errors.len() - COUNT;
-        wider.errors[from..].iter_mut().zip(spread).for_each(|(error, tau)| *error = error.hypot(*tau));
+        wider.errors[from..].iter_mut().zip(tau).for_each(|(error, tau)| *error = error.hypot(*tau));
         wider
     }
 }
@@ -409,9 +409,9 @@ mod tests {
         };
         let at_bound = [1.0 - MOST_OFF, 1.0 + MOST_OFF, 1.29].map(|factor| fit(factor).is_at_bound());
         assert_eq!(at_bound, [true, true, false]);
-        let mut spread = [0.0; COUNT];
-        spread[0] = 4.0;
-        let wider = fit(1.0).widened(&spread);
+        let mut tau = [0.0; COUNT];
+        tau[0] = 4.0;
+        let wider = fit(1.0).widened(&tau);
         assert_eq!(wider.errors[..3], [3.0, 5.0, 3.0]);
     }
 }

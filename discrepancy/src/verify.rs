@@ -93,7 +93,7 @@ pub(crate) fn verify(
         let (axis, at) = after.windows.outputs[output];
         let noise = record.noise[axis][at] * levels[output].sqrt();
         misfit.insert(name.clone(), signal_misfit(&models, output, noise, null.spreads[output]));
-        let of = |model: &Model<'_>| power::neighbours(&model.residual, output, outputs, &all_kept);
+        let of = |model: &Model<'_>| power::lag1_autocorrelation(&model.residual, output, outputs, &all_kept);
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
     let worse = misfit.values().any(|misfit| misfit.after > WORSE * misfit.before);

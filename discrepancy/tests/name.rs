@@ -98,15 +98,15 @@ fn parameters_that_absorb_a_missing_law_disagree_between_windows_and_one_that_is
         name(&Engine::new(&records, &baseline), Vec::new(), &mut |_| ())
     };
     let absorbing = alone(&hiding(&[("friction-asymmetry", "drive", &[("asymmetry_percent", 30.0)])]));
-    let moved = absorbing.reported.factors.iter().zip(absorbing.parameter_spread);
+    let moved = absorbing.reported.factors.iter().zip(absorbing.parameter_tau);
     let disagree =
         moved.filter(|(factor, spread)| **factor != 1.0 && *spread > 0.3 * (**factor - 1.0).abs()).count();
     let mut factors = [1.0; COUNT];
     factors[0] = 1.03;
     let off = alone(&with_factors(&baseline, &factors));
-    assert!(disagree > 0, "{:?} {:?}", absorbing.reported.factors, absorbing.parameter_spread);
+    assert!(disagree > 0, "{:?} {:?}", absorbing.reported.factors, absorbing.parameter_tau);
     assert!((off.reported.factors[0] - 1.03).abs() < 0.01, "{:?}", off.reported.factors);
-    assert_eq!(off.parameter_spread, [0.0; COUNT]);
+    assert_eq!(off.parameter_tau, [0.0; COUNT]);
 }
 
 /// Amplitude from which on a candidate would have been named.

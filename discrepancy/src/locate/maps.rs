@@ -1,6 +1,6 @@
 //! Binned means of unknown inputs over their strongest variables, with bands; over two variables as a surface.
 
-use super::{MEMORY, UnknownPoint, UnknownSeries, VARIABLES};
+use super::{HISTORY_COMPLEXITY, UnknownPoint, UnknownSeries, VARIABLES};
 use crate::report::{Curve, Surface};
 
 pub(crate) const BINS: usize = 20;
@@ -16,7 +16,8 @@ const DRAWN: f64 = 1.1;
 pub(super) fn maps(series: &[UnknownSeries]) -> Vec<Curve> {
     let mut maps = Vec::new();
     for series in series.iter().filter(|series| series.birge_ratio().is_some_and(|ratio| ratio > DRAWN)) {
-        let present = (0..VARIABLES.len()).filter(|variable| VARIABLES[*variable].complexity < MEMORY);
+        let present =
+            (0..VARIABLES.len()).filter(|variable| VARIABLES[*variable].complexity < HISTORY_COMPLEXITY);
         let mut ranked: Vec<(usize, f64)> =
             present.map(|variable| (variable, between(series, variable))).collect();
         ranked.sort_by(|left, right| right.1.total_cmp(&left.1));

@@ -19,7 +19,7 @@
 
 use super::elimination::{Selection, has_effect, is_same_set};
 use super::explanations::Explanation;
-use super::heterogeneity::parameter_spread;
+use super::heterogeneity::parameter_tau;
 use super::needed_parameters::{significantly_off, with_needed};
 use super::{axes_of, is_large, loss_on};
 use crate::engine::Engine;
@@ -198,8 +198,8 @@ fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Op
 
 /// Number of parameters that a model has significantly off.
 fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
-    let spread = parameter_spread(engine, &linearise(engine, model), model).unwrap_or([0.0; COUNT]);
-    significantly_off(engine, &model.widened(&spread)).into_iter().filter(|is_off| *is_off).count()
+    let tau = parameter_tau(engine, &linearise(engine, model), model).unwrap_or([0.0; COUNT]);
+    significantly_off(engine, &model.widened(&tau)).into_iter().filter(|is_off| *is_off).count()
 }
 
 /// Whether the effects of the search's model are less probable than the null model or than [`LEAST_PROBABLE`].

@@ -105,7 +105,7 @@ pub(crate) struct Heterogeneity {
     /// CV_B of the leading amplitude.
     pub(crate) variation: f64,
     /// tau of each coordinate; 0 without high heterogeneity.
-    pub(crate) spread: Vec<f64>,
+    pub(crate) tau: Vec<f64>,
 }
 
 /// CV_B of each effect of a model.
@@ -132,30 +132,30 @@ pub(super) fn heterogeneity(
             let columns = column..column + effect.coordinates.len();
             column = columns.end;
             let scale = windows.with_response(engine, model, at, columns.start + leading_key(effect))?;
-            let variation = spread_of(&informative(&scale));
-            let spread = columns.map(|column| Some(significant_spread(&windows.changes(column)?)));
-            Some(Heterogeneity { variation, spread: spread.collect::<Option<_>>()? })
+            let variation = between_window_sd(&informative(&scale));
+            let tau = columns.map(|column| Some(significant_tau(&windows.changes(column)?)));
+            Some(Heterogeneity { variation, tau: tau.collect::<Option<_>>()? })
         })
         .collect()
 }
 
 /// tau of each parameter that a model moves from the rig file's value, 0 without high heterogeneity. `None` where no derivative
 /// exists.
-pub(super) fn parameter_spread(
+pub(super) fn parameter_tau(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
     model: &Refit,
 ) -> Option<[f64; COUNT]> {
-    let mut spread = [0.0; COUNT];
+    let mut tau = [0.0; COUNT];
     let moved: Vec<usize> = (0..COUNT).filter(|at| model.factors[*at] != 1.0).collect();
     if moved.is_empty() {
-        return Some(spread);
+        return Some(tau);
     }
     let windows = WindowwiseFits::new(engine, linearisation, model)?;
     for at in moved {
-        spread[at] = significant_spread(&windows.changes(at)?);
+        tau[at] = significant_tau(&windows.changes(at)?);
     }
-    Some(spread)
+    Some(tau)
 }
 
 /// Linearised fit of each window by itself: parameters of the model first, then the coordinates of its effects.
@@ -206,15 +206,15 @@ impl WindowwiseFits {
 
 /// tau where I^2 is above [`HIGH_I2`], else 0. Neither uninformative windows count, nor the few that disagree most: there the
 /// break-away came at another moment.
-fn significant_spread(changes: &[(f64, f64)]) -> f64 {
+fn significant_tau(changes: &[(f64, f64)]) -> f64 {
     let mut informative = informative(changes);
     let mean = mean_of(&informative);
     let part = |(change, information): &(f64, f64)| information * (change - mean).powi(2);
     informative.sort_by(|left, right| part(left).total_cmp(&part(right)));
     informative.truncate(informative.len() - (MAX_OUTLIER_SHARE * informative.len() as f64) as usize);
     let dof = informative.len() as f64 - 1.0;
-    if dof >= 1.0 && heterogeneity_of(&informative) * (1.0 - HIGH_I2) > dof {
-        spread_of(&informative)
+    if dof >= 1.0 && cochran_q(&informative) * (1.0 - HIGH_I2) > dof {
+        between_window_sd(&informative)
     } else {
         0.0
     }
@@ -226,8 +226,8 @@ fn informative(changes: &[(f64, f64)]) -> Vec<(f64, f64)> {
     changes.iter().copied().filter(|(_, information)| *information > MIN_INFORMATION_SHARE * most).collect()
 }
 
-/// Q of the changes that windows ask for, each with its information.
-fn heterogeneity_of(changes: &[(f64, f64)]) -> f64 {
+/// Cochran's Q of the changes that windows ask for, each with its information.
+fn cochran_q(changes: &[(f64, f64)]) -> f64 {
     let mean = mean_of(changes);
     changes.iter().map(|(change, information)| information * (change - mean).powi(2)).sum()
 }
@@ -239,14 +239,14 @@ fn mean_of(changes: &[(f64, f64)]) -> f64 {
 }
 
 /// tau of the changes that windows ask for, each with its information.
-fn spread_of(changes: &[(f64, f64)]) -> f64 {
+fn between_window_sd(changes: &[(f64, f64)]) -> f64 {
     let total: f64 = changes.iter().map(|(_, information)| information).sum();
     let squares: f64 = changes.iter().map(|(_, information)| information * information).sum();
     let spare = total - squares / total;
     if spare <= 0.0 {
         return 0.0;
     }
-    let variance = (heterogeneity_of(changes) - (changes.len() as f64 - 1.0)) / spare;
+    let variance = (cochran_q(changes) - (changes.len() as f64 - 1.0)) / spare;
     variance.max(0.0).sqrt()
 }
 
@@ -259,17 +259,17 @@ mod tests {
         let changes: Vec<(f64, f64)> =
             (0..20).map(|window| (if window % 2 == 0 { 0.1 } else { -0.1 }, 100.0)).collect();
         // Q = 20 of 19 expected.
-        let small = spread_of(&changes);
+        let small = between_window_sd(&changes);
         assert!(small < 0.03, "{small}");
-        assert_eq!(significant_spread(&changes), 0.0);
+        assert_eq!(significant_tau(&changes), 0.0);
     }
 
     #[test]
     fn windows_that_ask_for_different_amplitudes_have_the_variation_of_those() {
         let changes: Vec<(f64, f64)> =
             (0..20).map(|window| (if window % 2 == 0 { 0.5 } else { -0.5 }, 100.0)).collect();
-        let spread = significant_spread(&changes);
-        assert!((spread - 0.5).abs() < 0.03, "{spread}");
+        let tau = significant_tau(&changes);
+        assert!((tau - 0.5).abs() < 0.03, "{tau}");
     }
 
     #[test]
@@ -280,11 +280,11 @@ mod tests {
             let informative = (0..20).map(|window| (sign(window) * (0.95 * times).sqrt() * 0.1, 100.0));
             informative.chain((0..200).map(|window| (sign(window), 1e-12))).collect()
         };
-        assert_eq!(significant_spread(&changes(3.9)), 0.0);
+        assert_eq!(significant_tau(&changes(3.9)), 0.0);
         let mut one_disagrees = changes(1.0);
         one_disagrees[0].0 = 10.0;
-        assert_eq!(significant_spread(&one_disagrees), 0.0);
-        let spread = significant_spread(&changes(4.1));
-        assert!((spread - 0.1 * (4.1_f64 - 1.0).sqrt()).abs() < 1e-9, "{spread}");
+        assert_eq!(significant_tau(&one_disagrees), 0.0);
+        let tau = significant_tau(&changes(4.1));
+        assert!((tau - 0.1 * (4.1_f64 - 1.0).sqrt()).abs() < 1e-9, "{tau}");
     }
 }

@@ -98,15 +98,15 @@ impl Fitted<'_> {
     /// Records drawn with parameters alone; `None` where no rig has them.
     fn drawn_under_null(&self, model: &Refit, gain: f64) -> Option<DrawnRecords> {
         let engine = self.engine;
-        let truth = Truth::new(engine, self.calibrated)?;
+        let generating = GeneratingModel::new(engine, self.calibrated)?;
         // Whatever the factors, these columns span what parameters do; priors count from where the factors are.
         let (columns, factors) = (self.linearisation.columns.clone(), self.calibrated.factors);
         let linearisation = Linearisation { columns, factors };
         let all = self.columns.with_model(&linearisation, &[]);
-        let products = engine.products(&truth.simulated, &all);
+        let products = engine.products(&generating.simulated, &all);
         let count = model.effects.len();
         let draw = |number: usize| {
-            let (drawn, residual) = truth.drawn(SEED, number);
+            let (drawn, residual) = generating.drawn(SEED, number);
             let products = products.of_residual(&residual, &all, drawn.rows);
             self.columns.largest_gain(&products, &linearisation, count, |without, with| {
                 without_best(&window_gains(&drawn.scaled_dof, without, with))
@@ -131,12 +131,12 @@ impl Fitted<'_> {
     /// Records drawn with another set of effects; `None` where no derivative exists.
     fn against(&self, model: &Refit, other: &Refit, draws: usize) -> Option<DrawnRecords> {
         let dof = &self.engine.scaled_dof;
-        let truth = Truth::new(self.engine, other)?;
+        let generating = GeneratingModel::new(self.engine, other)?;
         let [model_step, other_step] =
             [model, other].map(|fit| OneStep::new(self.engine, self.linearisation, fit));
         let (model_step, other_step) = (model_step?, other_step?);
         let draw = |number: usize| {
-            let (drawn, residual) = truth.drawn(SEED_OTHER, number);
+            let (drawn, residual) = generating.drawn(SEED_OTHER, number);
             let of_model = drawn.residual(&drawn.simulate(&model_step.rig));
             other_step.loss(&residual, drawn.rows) - model_step.loss(&of_model, drawn.rows)
         };
@@ -145,18 +145,18 @@ impl Fitted<'_> {
     }
 }
 
-/// A model that makes records.
-struct Truth<'a> {
+/// The model that bootstrap records are drawn from.
+struct GeneratingModel<'a> {
     engine: &'a Engine<'a>,
     rig: RigParameters,
     simulated: Vec<f64>,
 }
 
-impl<'a> Truth<'a> {
+impl<'a> GeneratingModel<'a> {
     fn new(engine: &'a Engine<'a>, model: &Refit) -> Option<Self> {
         let rig = rig_of(&engine.rig, &model.effects, &model.factors)?;
         let simulated = engine.simulate(&rig);
-        Some(Truth { engine, rig, simulated })
+        Some(GeneratingModel { engine, rig, simulated })
     }
 
     /// A record of it, and what the model itself leaves of that.

@@ -9,7 +9,9 @@
 //! Source: discrepancy-notes.md, Pipeline 8. Short laws before good ones: Udrescu, Tegmark 2020, Science Advances 6(16).
 
 use super::dependence::{Bins, Sample};
-use crate::locate::{DIRECTION, MEMORY, POSITION, SPEED, TIME, VARIABLES, VELOCITY, WindowVariable};
+use crate::locate::{
+    DIRECTION, HISTORY_COMPLEXITY, POSITION, SPEED, TIME, VARIABLES, VELOCITY, WindowVariable,
+};
 use std::f64::consts::TAU;
 
 /// Share of the best gain that a shorter formula must reach.
@@ -69,7 +71,8 @@ fn binned(sample: &Sample) -> f64 {
 
 fn forms() -> Vec<CandidateFormula> {
     let mut forms = vec![form(1, "", "", true, |_| 0.0)];
-    for at in (0..VARIABLES.len()).filter(|at| *at != TIME && VARIABLES[*at].complexity < MEMORY) {
+    let is_present = |at: &usize| *at != TIME && VARIABLES[*at].complexity < HISTORY_COMPLEXITY;
+    for at in (0..VARIABLES.len()).filter(is_present) {
         let WindowVariable { name, unit, nodes, .. } = VARIABLES[at];
         let text = if name == "p_a-p_b" { "(p_a-p_b)" } else { name };
         forms.push(form(2 + nodes, text, unit, false, move |variables| variables[at]));

@@ -143,7 +143,7 @@ pub(super) fn pooled(squares: &[Squares], kept: &[bool]) -> f64 {
 }
 
 /// Lag-1 autocorrelation of an output in the remaining windows.
-pub(super) fn neighbours(residual: &[f64], output: usize, outputs: usize, kept: &[bool]) -> f64 {
+pub(super) fn lag1_autocorrelation(residual: &[f64], output: usize, outputs: usize, kept: &[bool]) -> f64 {
     let (mut products, mut squares) = (0.0, 0.0);
     for (window, _) in residual.chunks_exact(WINDOW_PERIODS * outputs).zip(kept).filter(|(_, kept)| **kept) {
         let series: Vec<f64> = window.iter().skip(output).step_by(outputs).copied().collect();

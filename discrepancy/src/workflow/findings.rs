@@ -66,9 +66,7 @@ fn effects(found: &SelectionResult) -> (Vec<NamedEffect>, Vec<NamedEffect>) {
         let disagreement = found.heterogeneity.get(index);
         let within = &model.errors[at..at + effect.coordinates.len()];
         let errors: Vec<f64> = match disagreement {
-            Some(windows) => {
-                within.iter().zip(&windows.spread).map(|(one, other)| one.hypot(*other)).collect()
-            }
+            Some(windows) => within.iter().zip(&windows.tau).map(|(one, other)| one.hypot(*other)).collect(),
             None => within.to_vec(),
         };
         at += effect.coordinates.len();
@@ -129,7 +127,7 @@ fn named_effect(
 
 /// Parameters that are significantly off, and those that the model moved by less.
 fn parameters(engine: &Engine<'_>, found: &SelectionResult) -> (Vec<Quantity>, Vec<Quantity>) {
-    let model = found.reported.widened(&found.parameter_spread);
+    let model = found.reported.widened(&found.parameter_tau);
     let is_off = significantly_off(engine, &model);
     let (significant, insignificant): (Vec<usize>, Vec<usize>) =
         (0..COUNT).filter(|at| model.factors[*at] != 1.0).partition(|at| is_off[*at]);
