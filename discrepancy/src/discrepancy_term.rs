@@ -224,8 +224,9 @@ impl Term {
                 let precisions: Vec<f64> =
                     self.precisions.iter().copied().chain(std::iter::repeat_n(precision, count)).collect();
                 let (with, with_determinant) = self.fitted(&products, &precisions);
-                let spread = -(count as f64) * precision.ln();
-                let log_evidence = -0.5 * (with - loss + spread + with_determinant - log_determinant);
+                let prior_log_determinant = -(count as f64) * precision.ln();
+                let log_evidence =
+                    -0.5 * (with - loss + prior_log_determinant + with_determinant - log_determinant);
                 Group { axis, kinds, regressor, log_evidence, loss_reduction: loss - with }
             };
             SIZES

@@ -28,11 +28,11 @@ const PASSES: usize = 12;
 const ABSOLUTE_TOLERANCE: f64 = 1e-3;
 
 /// Lower bound of the chi2 per degree of freedom of a window.
-pub(crate) const LEAST: f64 = 1e-3;
+pub(crate) const MIN_CHI2_PER_DOF: f64 = 1e-3;
 
 /// The loss of windows with these squares and degrees of freedom.
 pub(crate) fn loss(squares: &[f64], dof: &[f64]) -> f64 {
-    squares.iter().zip(dof).map(|(square, dof)| dof * (square / dof).max(LEAST).ln()).sum()
+    squares.iter().zip(dof).map(|(square, dof)| dof * (square / dof).max(MIN_CHI2_PER_DOF).ln()).sum()
 }
 
 /// Products of a residual and some columns, window by window.
@@ -150,7 +150,7 @@ impl Products {
     }
 
     pub(crate) fn weights(&self, squares: &[f64]) -> Vec<f64> {
-        let weight = |(square, dof): (&f64, &f64)| dof / square.max(LEAST * dof);
+        let weight = |(square, dof): (&f64, &f64)| dof / square.max(MIN_CHI2_PER_DOF * dof);
         squares.iter().zip(&self.dof).map(weight).collect()
     }
 

@@ -260,8 +260,8 @@ impl GriddedRecord {
     /// [`AxisState::PERTURBATIONS`]; 0 of the rate of an axis at rest.
     pub(crate) fn state_errors(&self, axis: usize, rests: bool) -> [f64; 4] {
         let error = |channel: usize, variance: f64| {
-            let share = self.lag1_autocorrelation[axis][channel];
-            self.noise[axis][channel] * (variance * (1.0 + share) / (1.0 - share)).sqrt()
+            let r = self.lag1_autocorrelation[axis][channel];
+            self.noise[axis][channel] * (variance * (1.0 + r) / (1.0 - r)).sqrt()
         };
         let pressure = parabola_variance(PRESSURE_REACH);
         let [position, rate] = if rests {
@@ -283,9 +283,9 @@ impl GriddedRecord {
         let pressures = [parabolas(&column(2), PRESSURE_REACH), parabolas(&column(3), PRESSURE_REACH)];
         let mut classifier = RestClassifier::new(&position, &positions, self.noise[i][0]);
         // Autocorrelation widens the error of a mean.
-        let share = lag1_autocorrelation(&positions, &classifier.resting(), self.noise[i][0]);
-        if share > 0.0 {
-            let lasting_m = self.noise[i][0] * ((1.0 + share) / (1.0 - share)).sqrt();
+        let r = lag1_autocorrelation(&positions, &classifier.resting(), self.noise[i][0]);
+        if r > 0.0 {
+            let lasting_m = self.noise[i][0] * ((1.0 + r) / (1.0 - r)).sqrt();
             classifier = RestClassifier::new(&position, &positions, lasting_m);
         }
         for place in 0..self.len() {
@@ -313,8 +313,7 @@ impl GriddedRecord {
     }
 }
 
-/// Share of a channel's noise that is there a period later, from its differences at rest: var(difference) = 2 sigma^2 (1
-/// - share).
+/// Lag-1 autocorrelation r of a channel's noise, from its differences at rest: var(difference) = 2 sigma^2 (1 - r).
 fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) -> f64 {
     let mut variances: Vec<f64> = (0..values.len().saturating_sub(1) / LAG1_BLOCK_DIFFERENCES)
         .filter_map(|block| {
@@ -329,9 +328,9 @@ fn lag1_autocorrelation(values: &[Option<f64>], resting: &[bool], noise: f64) ->
     if variances.len() < FEWEST_AT_REST {
         return 0.0;
     }
-    let spread = median(&mut variances).map_or(0.0, f64::sqrt);
-    let share = 1.0 - spread * spread / (2.0 * noise * noise);
-    if share < LEAST_AUTOCORRELATION { 0.0 } else { share.min(0.95) }
+    let difference_sd = median(&mut variances).map_or(0.0, f64::sqrt);
+    let r = 1.0 - difference_sd * difference_sd / (2.0 * noise * noise);
+    if r < LEAST_AUTOCORRELATION { 0.0 } else { r.min(0.95) }
 }
 
 /// Sampling jitter: the part of the scatter of positions around their parabolas that grows with the speed.

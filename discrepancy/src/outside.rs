@@ -64,10 +64,10 @@ pub fn outside(
         // Whether there is a term is judged without history variables: more tests would find more by chance.
         let plain =
             VARIABLES.iter().zip(&tests).filter(|(variable, _)| variable.complexity < HISTORY_COMPLEXITY);
-        let stands_out = plain.map(|(_, test)| test.2).fold(0.0, f64::max);
+        let shift_z = plain.map(|(_, test)| test.2).fold(0.0, f64::max);
         let lifted = series.birge_ratio().is_some_and(|ratio| ratio > MIN_BIRGE_RATIO);
         let is_located = located.is_some_and(|located| located.balance == series.balance);
-        if !is_located && !lifted && stands_out < MIN_SHIFT_Z && sample.mean_over_error().abs() < MIN_MEAN_Z {
+        if !is_located && !lifted && shift_z < MIN_SHIFT_Z && sample.mean_over_error().abs() < MIN_MEAN_Z {
             continue;
         }
         let excess = if is_located { f64::INFINITY } else { sample.excess() };

@@ -120,8 +120,8 @@ impl Columns {
             let fitted: Vec<(usize, BestColumns)> =
                 others.filter_map(|at| Some((at, self.best_columns(products, at, &joint)?))).collect();
             let gains = fitted.iter().map(|(_, best)| {
-                let charged = COLUMN_PENALTY * best.columns.len() as f64 + joint.penalty;
-                gain(&null.squares, &best.squares) - charged
+                let penalty = COLUMN_PENALTY * best.columns.len() as f64 + joint.penalty;
+                gain(&null.squares, &best.squares) - penalty
             });
             largest = gains.fold(largest, f64::max);
             let best = fitted.into_iter().min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));

@@ -27,7 +27,7 @@ mod null_power;
 mod power;
 mod traces;
 
-use crate::fit::LEAST;
+use crate::fit::MIN_CHI2_PER_DOF;
 use crate::gridded_record::{CHANNELS, GriddedRecord, SIGNALS, searched_share};
 use crate::name::lack_of_fit_per_dof;
 use crate::page::Trace;
@@ -47,7 +47,7 @@ pub(crate) const VARIANCE_FACTOR_BOUNDS: [f64; 2] = [0.75, 1.15];
 /// Significance of an improvement, in standard errors.
 const BETTER_ERRORS: f64 = 3.0;
 /// Smallest excess in null standard deviations; below, the closed share is not known to a tenth.
-const EXCESS_SPREADS: f64 = 10.0;
+const MIN_EXCESS_Z: f64 = 10.0;
 
 /// Result of a held-out record.
 #[derive(Clone, Debug)]
@@ -92,7 +92,7 @@ pub(crate) fn verify(
     for (output, name) in names.iter().enumerate() {
         let (axis, at) = after.windows.outputs[output];
         let noise = record.noise[axis][at] * levels[output].sqrt();
-        misfit.insert(name.clone(), signal_misfit(&models, output, noise, null.spreads[output]));
+        misfit.insert(name.clone(), signal_misfit(&models, output, noise, null.pooled_sds[output]));
         let of = |model: &Model<'_>| power::lag1_autocorrelation(&model.residual, output, outputs, &all_kept);
         whiteness.insert(name.clone(), BeforeAfter { before: of(&before), after: of(&after) });
     }
@@ -151,13 +151,13 @@ fn column(axis: usize, at: usize) -> String {
     Channel::Of(Axis::ALL[axis], SIGNALS[at]).column()
 }
 
-/// Misfit of an output; `noise` in its unit, `spread` the null standard deviation of the pooled power.
-fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, spread: f64) -> SignalMisfit {
+/// Misfit of an output; `noise` in its unit, `null_sd` the null standard deviation of the pooled power.
+fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, null_sd: f64) -> SignalMisfit {
     let [before, after] = models.each_ref().map(|power| power.output(output));
     let kept = untrimmed(&models[0].smaller(&models[1]).output(output));
     let [before_power, after_power] = [&before, &after].map(|squares| pooled(squares, &kept));
     let excess = before_power - 1.0;
-    let is_resolved = excess > EXCESS_SPREADS * spread;
+    let is_resolved = excess > MIN_EXCESS_Z * null_sd;
     SignalMisfit {
         before: noise * before_power.sqrt(),
         after: noise * after_power.sqrt(),
@@ -168,12 +168,13 @@ fn signal_misfit(models: &[Power; 2], output: usize, noise: f64, spread: f64) ->
 
 /// Whether the mean log improvement exceeds [`BETTER_ERRORS`] over independent windows.
 fn is_better(before: &Power, after: &Power) -> bool {
+    let bounded = |chi2_per_dof: f64| chi2_per_dof.max(MIN_CHI2_PER_DOF);
     let gains: Vec<f64> = before
         .joint()
         .iter()
         .zip(after.joint())
         .filter(|(before, _)| before.expected > 0.0)
-        .map(|(before, after)| after.expected * (before.ratio().max(LEAST) / after.ratio().max(LEAST)).ln())
+        .map(|(before, after)| after.expected * (bounded(before.ratio()) / bounded(after.ratio())).ln())
         .collect();
     let count = gains.len() as f64;
     if count < 2.0 {

@@ -301,7 +301,7 @@ pub(crate) fn fitted_from<'a>(
             sum.iter_mut().zip(block).for_each(|(sum, normal)| *sum += normal.squares);
             sum
         });
-    let effective = effective(&fitting, &point)?;
+    let effective = effective_sample_sizes(&fitting, &point)?;
     let steps = steps(&normals, &normal, &fitting, &point);
     Ok(Fitted {
         suspects: suspects.to_vec(),
@@ -319,10 +319,10 @@ pub(crate) fn fitted_from<'a>(
 }
 
 /// Effective sample size of the residual of each output.
-pub(super) fn effective(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> {
+pub(super) fn effective_sample_sizes(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<f64>, Failure> {
     let residuals = series(fitting, point)?;
     let of_output =
-        |(output, residual): (usize, &Vec<Vec<f64>>)| independent(residual, fitting.count(output));
+        |(output, residual): (usize, &Vec<Vec<f64>>)| effective_sample_size(residual, fitting.count(output));
     Ok(residuals.iter().enumerate().map(of_output).collect())
 }
 
@@ -339,20 +339,20 @@ fn series(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<Vec<Vec<f64>>>, Fa
 }
 
 /// Effective sample size: n / (1 + 2 sum of the autocorrelations up to the first that is not positive), at least 2.
-fn independent(series: &[Vec<f64>], count: f64) -> f64 {
+fn effective_sample_size(series: &[Vec<f64>], count: f64) -> f64 {
     let sum: f64 = covariance::autocorrelation(series).iter().sum();
     (count / (1.0 + 2.0 * sum)).max(2.0)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::independent;
+    use super::effective_sample_size;
 
     #[test]
     fn rows_that_repeat_their_neighbours_count_once() {
         // A hundred values, each ten times, of alternating signs.
         let residual = (0..1000).map(|at| if (at / 10) % 2 == 0 { 1.0 } else { -1.0 }).collect();
-        let effective = independent(&[residual], 1000.0);
+        let effective = effective_sample_size(&[residual], 1000.0);
         assert!((100.0..300.0).contains(&effective), "{effective}");
     }
 }

@@ -32,7 +32,7 @@ pub(super) fn check(notes: &mut Notes, rig: &RigParameters) {
 }
 
 /// Values near both ends and in the middle: 1, 50 and 99 %.
-fn spread(notes: &Notes, channel: Channel) -> Option<[f64; 3]> {
+fn quantiles(notes: &Notes, channel: Channel) -> Option<[f64; 3]> {
     let mut values: Vec<f64> = (0..notes.record.len()).filter_map(|row| notes.value(channel, row)).collect();
     let [low, middle, high] = [0.01, 0.5, 0.99].map(|share| quantile(&mut values, share));
     Some([low?, middle?, high?])
@@ -44,7 +44,7 @@ fn add_finding(notes: &mut Notes, channel: Channel, beyond: impl Fn(f64) -> bool
 }
 
 fn pressure(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
-    let Some([low, middle, high]) = spread(notes, channel) else { return };
+    let Some([low, middle, high]) = quantiles(notes, channel) else { return };
     let supply = rig.supply();
     let (least, most) = (BELOW_EXHAUST * supply.exhaust_pressure_pa, ABOVE_SUPPLY * supply.pressure_pa);
     let fits = |low: f64, high: f64| low > least && high < most;
@@ -74,7 +74,7 @@ fn pressure(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
 }
 
 fn position(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
-    let Some([low, middle, high]) = spread(notes, channel) else { return };
+    let Some([low, middle, high]) = quantiles(notes, channel) else { return };
     let stroke = rig.cylinder().stroke_m;
     let fits = |value: f64| value > -BEYOND_STROKE * stroke && value < (1.0 + BEYOND_STROKE) * stroke;
     // Minus the position is a sign and no unit.
@@ -94,7 +94,7 @@ fn position(notes: &mut Notes, rig: &RigParameters, channel: Channel) {
 }
 
 fn valve(notes: &mut Notes, channel: Channel) {
-    let Some([low, middle, high]) = spread(notes, channel) else { return };
+    let Some([low, middle, high]) = quantiles(notes, channel) else { return };
     let mut all: Vec<f64> = (0..notes.record.len()).filter_map(|row| notes.value(channel, row)).collect();
     let (Some(least), Some(most)) = (quantile(&mut all, 0.0), quantile(&mut all, 1.0)) else { return };
     let size = most.abs().max(least.abs());

@@ -144,20 +144,20 @@ impl IntegratedInputs {
 pub(crate) struct HeavyTailed {
     pub(crate) scale: f64,
     /// Degrees of freedom: 1 is Cauchy.
-    pub(crate) freedom: f64,
+    pub(crate) dof: f64,
     /// Whether the coordinate has one sign only.
     pub(crate) is_one_sided: bool,
 }
 
 impl HeavyTailed {
     pub(crate) fn log_density(&self, z: f64) -> f64 {
-        let density = StudentsT::new(0.0, self.scale, self.freedom).expect("a scale is positive");
+        let density = StudentsT::new(0.0, self.scale, self.dof).expect("a scale is positive");
         density.ln_pdf(z) + if self.is_one_sided { 2.0_f64.ln() } else { 0.0 }
     }
 
     /// Precision of the normal prior with the same derivative here.
     pub(crate) fn precision(&self, z: f64) -> f64 {
-        (self.freedom + 1.0) / (self.freedom * self.scale.powi(2) + z.powi(2))
+        (self.dof + 1.0) / (self.dof * self.scale.powi(2) + z.powi(2))
     }
 }
 
@@ -210,9 +210,9 @@ pub(crate) fn log_marginal_likelihood(
         let precision = if priors.are_exact {
             without.matrix.clone()
         } else {
-            let spread =
+            let prior_covariance =
                 DMatrix::from_diagonal(&DVector::from_fn(parameters, |at, _| priors.parameters[at].recip()));
-            Cholesky::new(spread + without.factor.inverse())?.inverse()
+            Cholesky::new(prior_covariance + without.factor.inverse())?.inverse()
         };
         let pull = shift.transpose() * &precision;
         let hessian = with.among - with.between.transpose() * with.factor.solve(&with.between)
@@ -388,12 +388,12 @@ mod tests {
             let of_term = |inputs: &DMatrix<f64>| {
                 DMatrix::identity(ROWS, ROWS) + TERM.size.powi(2) * inputs * &correlation * inputs.transpose()
             };
-            let spread = DMatrix::from_diagonal(&DVector::from_iterator(
+            let prior_covariance = DMatrix::from_diagonal(&DVector::from_iterator(
                 2,
                 PRIOR_PRECISIONS.iter().map(|precision| precision.recip()),
             ));
             let covariance = of_term(&projected)
-                + &parameters * spread * parameters.transpose()
+                + &parameters * prior_covariance * parameters.transpose()
                 + scale.powi(2) * &coordinates * coordinates.transpose();
             let from_mean = &self.residual
                 + &parameters * DVector::from_column_slice(&DEVIATIONS)
@@ -422,8 +422,8 @@ mod tests {
         }
     }
 
-    fn prior(scale: f64, freedom: f64) -> HeavyTailed {
-        HeavyTailed { scale, freedom, is_one_sided: false }
+    fn prior(scale: f64, dof: f64) -> HeavyTailed {
+        HeavyTailed { scale, dof, is_one_sided: false }
     }
 
     #[test]

@@ -13,7 +13,7 @@ use super::UnknownSeries;
 use plant::Axis;
 
 /// Significance of an offset, in standard errors.
-const STANDS_OUT: f64 = 5.0;
+const MIN_OFFSET_Z: f64 = 5.0;
 /// Largest relative difference: a gain or a lag is no constant offset.
 const AGREES: f64 = 0.35;
 
@@ -27,10 +27,11 @@ pub(super) fn notes(axis: Axis, series: &[UnknownSeries]) -> Vec<String> {
         let Some(flow) = find(&format!("flow-{name}")) else { continue };
         let ((by_force, force_error), (by_flow, flow_error)) =
             (offset(force, chamber), offset(flow, chamber));
-        let stand_out = by_force.abs() > STANDS_OUT * force_error && by_flow.abs() > STANDS_OUT * flow_error;
+        let are_significant =
+            by_force.abs() > MIN_OFFSET_Z * force_error && by_flow.abs() > MIN_OFFSET_Z * flow_error;
         let differ = (by_force - by_flow).abs();
         let bound = AGREES * by_force.abs().min(by_flow.abs()) + 3.0 * force_error.hypot(flow_error);
-        if stand_out && by_force * by_flow > 0.0 && differ < bound {
+        if are_significant && by_force * by_flow > 0.0 && differ < bound {
             let axis = axis.name();
             notes.push(format!(
                 "{axis}.force and {axis}.flow-{name} move together as by a pressure sensor {name} that reads \

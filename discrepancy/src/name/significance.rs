@@ -24,7 +24,7 @@ use super::explanations::Explanation;
 use super::gauss_newton::coordinates;
 use super::{MIN_LOSS_REDUCTION, is_large, lacks_fit};
 use crate::engine::Engine;
-use crate::fit::{LEAST, Products, loss};
+use crate::fit::{MIN_CHI2_PER_DOF, Products, loss};
 use crate::refit::{
     EffectEstimate, Linearisation, Refit, coordinate_columns, prior_deviations, prior_precisions, rig_of,
 };
@@ -65,8 +65,8 @@ impl Fitted<'_> {
     /// Tests a model whose effects are to be named.
     pub(super) fn significance(&self, model: &Refit) -> Option<Significance> {
         let gains = window_gains(&self.engine.scaled_dof, &self.calibrated.squares, &model.squares);
-        let charged = COLUMN_PENALTY * coordinates(&model.effects) as f64;
-        let gain = gains.iter().sum::<f64>() - charged;
+        let penalty = COLUMN_PENALTY * coordinates(&model.effects) as f64;
+        let gain = gains.iter().sum::<f64>() - penalty;
         // Draws say how much chance gives without the best windows, which is far less than with them. Where there are none, what
         // any gain has to exceed counts; a threshold from a residual that is signal is no measure of chance.
         let least_gain = if !self.engine.is_linked() {
@@ -76,7 +76,7 @@ impl Fitted<'_> {
         } else {
             self.threshold.max(MIN_LOSS_REDUCTION)
         };
-        let gain_without_best = without_best(&gains) - charged;
+        let gain_without_best = without_best(&gains) - penalty;
         let chance = if self.engine.is_linked() {
             None
         } else {
@@ -227,7 +227,7 @@ fn drawn_records(
 /// Fall of the loss in each window.
 fn window_gains(dof: &[f64], without: &[f64], with: &[f64]) -> Vec<f64> {
     let gain = |((dof, without), with): ((&f64, &f64), &f64)| {
-        dof * ((without / dof).max(LEAST) / (with / dof).max(LEAST)).ln()
+        dof * ((without / dof).max(MIN_CHI2_PER_DOF) / (with / dof).max(MIN_CHI2_PER_DOF)).ln()
     };
     dof.iter().zip(without).zip(with).map(gain).collect()
 }

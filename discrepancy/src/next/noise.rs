@@ -62,10 +62,10 @@ impl ReadingNoise {
                 let mut samples = [[None; CHANNELS]; 2];
                 for axis in (0..2).filter(|axis| measured[*axis]) {
                     for channel in 0..CHANNELS {
-                        let share = self.lag1_autocorrelation[axis][channel];
+                        let r = self.lag1_autocorrelation[axis][channel];
                         let new = self.deviation[axis][channel] * gaussian();
                         let error = match lasting[axis][channel] {
-                            Some(before) => share * before + (1.0 - share * share).sqrt() * new,
+                            Some(before) => r * before + (1.0 - r * r).sqrt() * new,
                             None => new,
                         };
                         lasting[axis][channel] = Some(error);

@@ -98,8 +98,8 @@ impl Sample {
         let shifted: Vec<f64> = (1..=SHIFTS).map(|at| most(at * n / (SHIFTS + 1))).collect();
         let reached = shifted.iter().filter(|other| **other >= r2).count();
         let (mean, variance) = mean_and_variance(&shifted);
-        let stands_out = if variance > 0.0 { (r2 - mean) / variance.sqrt() } else { 0.0 };
-        (r2, (1 + reached) as f64 / (1 + SHIFTS) as f64, stands_out)
+        let shift_z = if variance > 0.0 { (r2 - mean) / variance.sqrt() } else { 0.0 };
+        (r2, (1 + reached) as f64 / (1 + SHIFTS) as f64, shift_z)
     }
 
     /// Cross-validated R2 of bin means, with the input shifted by some windows.

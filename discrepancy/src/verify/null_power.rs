@@ -25,14 +25,14 @@ pub(super) struct NullPower {
     /// Mean of [`Power::lower_decile`], of each output.
     pub(super) lower_decile: Vec<f64>,
     /// Standard deviation of each output's pooled power.
-    pub(super) spreads: Vec<f64>,
+    pub(super) pooled_sds: Vec<f64>,
     /// 95 % range of chi2 per degree of freedom: of the draws of noise or of the synthetic records, whichever is wider.
     pub(super) range: [f64; 2],
 }
 
 impl NullPower {
-    /// Of a model on a record. For a long record the synthetic records cover a `part`, and their spread is scaled by the number
-    /// of windows.
+    /// Of a model on a record. For a long record the synthetic records cover a `part`, and their standard deviation is
+    /// scaled by the number of windows.
     pub(super) fn new(model: &Model<'_>, part: Option<&Model<'_>>) -> Self {
         let (mut null, of_noise) = Self::of_noise(&model.windows);
         let (mean, of_records) = match part {
@@ -62,7 +62,7 @@ impl NullPower {
         let lower_decile = (0..outputs)
             .map(|output| powers.iter().map(|power| power.lower_decile()[output]).sum::<f64>() / DRAWS as f64)
             .collect();
-        let mut null = NullPower { expected, lower_decile, spreads: Vec::new(), range: [1.0; 2] };
+        let mut null = NullPower { expected, lower_decile, pooled_sds: Vec::new(), range: [1.0; 2] };
         // Each draw is processed like a record: level correction and trimming.
         let powers: Vec<Power> =
             powers.iter().map(|power| power.divided_by_levels(&levels(power, &null))).collect();
@@ -70,10 +70,13 @@ impl NullPower {
             let squares = power.output(output);
             pooled(&squares, &untrimmed(&squares))
         };
-        null.spreads = (0..outputs)
-            .map(|output| spread(&powers.iter().map(|power| of_output(power, output)).collect::<Vec<_>>()).1)
+        null.pooled_sds = (0..outputs)
+            .map(|output| {
+                let pooled: Vec<f64> = powers.iter().map(|power| of_output(power, output)).collect();
+                mean_and_sd(&pooled).1
+            })
             .collect();
-        let (_, of_noise) = spread(&powers.iter().map(joint).collect::<Vec<_>>());
+        let (_, of_noise) = mean_and_sd(&powers.iter().map(joint).collect::<Vec<_>>());
         (null, of_noise)
     }
 
@@ -89,7 +92,7 @@ impl NullPower {
             let power = Power::new(&sums(&residual, outputs), &self.expected, outputs);
             joint(&power.divided_by_levels(&levels(&power, self)))
         });
-        spread(&left)
+        mean_and_sd(&left)
     }
 }
 
@@ -98,7 +101,7 @@ fn joint(power: &Power) -> f64 {
     pooled(&squares, &untrimmed(&squares))
 }
 
-fn spread(values: &[f64]) -> (f64, f64) {
+fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     let (mean, variance) = mean_and_variance(values);
     (mean, variance.sqrt())
 }

@@ -19,7 +19,7 @@ use super::super::fit::Fitting;
 use super::super::judge::GAIN_APART;
 use super::super::record::MeasuredRecord;
 use super::super::report::ModelReport;
-use super::super::select::{Fitted, SAME, effective};
+use super::super::select::{Fitted, SAME, effective_sample_sizes};
 use super::features::{Term, group_terms, variables};
 use super::screen::{Screen, coefficient};
 use super::{ROWS, start};
@@ -143,7 +143,7 @@ fn refit(
         outputs.map(|(output, (squares, before_them))| squares / before.variance(output, *before_them)).sum()
     };
     let share = (1.0 - scaled(&point.squares) / scaled(&baseline.point.squares)).clamp(0.0, 1.0);
-    Some((share, effective(&fitting, &point).ok()?.iter().sum()))
+    Some((share, effective_sample_sizes(&fitting, &point).ok()?.iter().sum()))
 }
 
 /// Terms of one place and the same variables.

@@ -12,8 +12,8 @@ const NO_TERM: f64 = 0.5;
 /// Scale of the half-Cauchy prior of the size of none of these: the middle of the forces that are drawn.
 const SIZE_OF_NONE: f64 = 20.0;
 /// Degrees of freedom of the Student t priors of amplitudes and of shapes, and the scale of shapes, in widths of the drawn range.
-const AMPLITUDE_FREEDOM: f64 = 1.0;
-const SHAPE_FREEDOM: f64 = 4.0;
+const AMPLITUDE_DOF: f64 = 1.0;
+const SHAPE_DOF: f64 = 4.0;
 const SHAPE_SCALE: f64 = 0.5;
 
 /// Prior probabilities of the kinds: as often nothing is missing as an effect is, and once in five what nobody listed.
@@ -56,21 +56,17 @@ pub(super) fn prior_of_terms(covariances: &[Covariance], kind: ExplanationKind) 
 
 pub(super) fn prior_of_coordinate(candidate: &Candidate, key: usize) -> HeavyTailed {
     if candidate.is_shape(key) {
-        return HeavyTailed { scale: SHAPE_SCALE, freedom: SHAPE_FREEDOM, is_one_sided: false };
+        return HeavyTailed { scale: SHAPE_SCALE, dof: SHAPE_DOF, is_one_sided: false };
     }
     let ends = candidate.sheet.keys[key].drawn.map(|number| candidate.coordinate(key, number).abs());
     let [least, most] = candidate.fit_bounds(key);
-    HeavyTailed {
-        scale: 0.5 * (ends[0] + ends[1]),
-        freedom: AMPLITUDE_FREEDOM,
-        is_one_sided: least * most >= 0.0,
-    }
+    HeavyTailed { scale: 0.5 * (ends[0] + ends[1]), dof: AMPLITUDE_DOF, is_one_sided: least * most >= 0.0 }
 }
 
 /// Coordinates whose amplitude priors are wider by a factor; shapes stay.
 pub(super) fn scaled(coordinates: &[(HeavyTailed, f64)], factor: f64) -> Vec<(HeavyTailed, f64)> {
     let wider = |(prior, z): &(HeavyTailed, f64)| {
-        let scale = if prior.freedom == AMPLITUDE_FREEDOM { factor * prior.scale } else { prior.scale };
+        let scale = if prior.dof == AMPLITUDE_DOF { factor * prior.scale } else { prior.scale };
         (HeavyTailed { scale, ..*prior }, *z)
     };
     coordinates.iter().map(wider).collect()
