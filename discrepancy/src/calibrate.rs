@@ -12,7 +12,7 @@ pub mod finer;
 
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{Linearisation, Refit, refit, relinearise};
+use crate::refit::{FittedModel, Linearisation, refit, relinearise};
 use crate::report::Quantity;
 use model_fit::estimator::CALIBRATION;
 
@@ -20,13 +20,13 @@ use model_fit::estimator::CALIBRATION;
 const UNRESOLVED: f64 = 0.7;
 
 /// Fits the parameters without effects.
-pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> Refit {
+pub fn calibrate(engine: &Engine<'_>, baseline: &Linearisation) -> FittedModel {
     let first = refit(engine, baseline, &[]).expect("the baseline is a rig");
     relinearise(engine, first, CALIBRATION)
 }
 
 /// A parameter of a fit, in the unit of the rig file; of tables their common factor.
-pub fn quantity(engine: &Engine<'_>, at: usize, fit: &Refit) -> Quantity {
+pub fn quantity(engine: &Engine<'_>, at: usize, fit: &FittedModel) -> Quantity {
     let (parameter, measured) = (PARAMETERS[at], engine.windows[0].record.measured);
     let (before, unit) = parameter.value(&engine.rig, measured);
     // The simulated value: numbers are clamped to their ranges, and the break-away force to the sliding force.

@@ -33,7 +33,7 @@ use crate::calibrate::calibrate;
 use crate::candidates::Candidate;
 use crate::engine::Engine;
 use crate::parameters::{COUNT, with_factors};
-use crate::refit::{EffectEstimate, Linearisation, Refit, coordinates, derivative, linearise, rig_of};
+use crate::refit::{EffectEstimate, FittedModel, Linearisation, coordinates, derivative, linearise, rig_of};
 use crate::report::Significance;
 use crate::screen::{Columns, ScreenedCandidate};
 pub use decision::NotExplained;
@@ -54,7 +54,7 @@ use null_distribution::NullDistribution;
 use plant::effects::sheet::Part;
 use round::SelectionRound;
 use significance::Fitted;
-use start_states::{RefitWithInitialStates, refit_with_starts};
+use start_states::{FitWithStartStates, refit_with_starts};
 
 /// Maximum number of effects, those below the amplitude floor included.
 const MAX_EFFECTS: usize = 3;
@@ -84,7 +84,7 @@ const MIN_AMPLITUDE_RATIO: f64 = 0.85;
 #[derive(Clone, Debug)]
 pub(crate) struct Alternative {
     /// The model with it as the last effect, fitted in the round in which the other one joined.
-    pub(crate) fit: Refit,
+    pub(crate) fit: FittedModel,
     /// Share of the excess that it removes.
     pub(crate) share: f64,
 }
@@ -93,19 +93,19 @@ pub(crate) struct Alternative {
 #[derive(Debug)]
 pub struct SelectionResult {
     /// Calibration: parameters without effects.
-    pub(crate) calibrated: Refit,
+    pub(crate) calibrated: FittedModel,
     /// The selected model, whether its effects are named or not; the calibration where none was selected.
-    pub model: Refit,
+    pub model: FittedModel,
     /// The model to report: parameters that it does not need are back at the rig file's values. Where the model is no
     /// explanation, the calibration alone.
-    pub reported: Refit,
+    pub reported: FittedModel,
     pub(crate) alternatives: Vec<Vec<Alternative>>,
     /// Share of the excess that each effect removes.
     pub shares: Vec<f64>,
     /// First screening of all candidates, best first.
     pub(crate) screened: Vec<ScreenedCandidate>,
     /// All fits, each with its candidate as the last effect.
-    pub(crate) fitted: Vec<Refit>,
+    pub(crate) fitted: Vec<FittedModel>,
     /// 99th percentile of the largest gain of any candidate under the null distribution.
     pub(crate) threshold: f64,
     /// Candidates with their whitened responses; `limits` is in their order.
@@ -145,7 +145,7 @@ pub fn name(
     let (calibrated_loss, mut screened) = columns.screen(engine, &linearisation, &baseline, &[]);
     screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 
-    let RefitWithInitialStates { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated);
+    let FitWithStartStates { engine: mut restarted, fit } = refit_with_starts(engine, &calibrated);
     let mut selection = Selection { calibrated: fit.clone(), model: fit, rounds: Vec::new() };
     let mut threshold = 0.0;
     let mut fitted = Vec::new();
@@ -283,12 +283,12 @@ pub(crate) fn on_all(engine: &Engine<'_>, found: &mut SelectionResult) {
 }
 
 /// Refits a model with sensitivities relinearised at itself.
-fn relinearise(engine: &Engine<'_>, model: Refit) -> Refit {
+fn relinearise(engine: &Engine<'_>, model: FittedModel) -> FittedModel {
     crate::refit::relinearise(engine, model, RELINEARISATION)
 }
 
 /// Whether a model's last effect removes the required share of the loss before it.
-fn gains_enough(engine: &Engine<'_>, before: &Refit, after: &Refit) -> bool {
+fn gains_enough(engine: &Engine<'_>, before: &FittedModel, after: &FittedModel) -> bool {
     let gain = before.loss - after.loss;
     let share = if before.effects.is_empty() { MIN_LOSS_SHARE_FIRST } else { MIN_LOSS_SHARE_FURTHER };
     gain > (share * loss_where_last_acts(engine, before, after)).max(MIN_LOSS_REDUCTION)
@@ -306,13 +306,13 @@ fn axes_of(effects: &[EffectEstimate]) -> [bool; 2] {
 }
 
 /// The loss of a fit on some axes, its penalties included; the whole one where the axes are not judged apart.
-fn loss_on(engine: &Engine<'_>, axes: [bool; 2], fit: &Refit) -> f64 {
+fn loss_on(engine: &Engine<'_>, axes: [bool; 2], fit: &FittedModel) -> f64 {
     let of = |axes: [bool; 2]| engine.loss_on(axes, &fit.squares).0;
     if engine.axis_by_axis && axes != [true; 2] { fit.loss - of([true; 2]) + of(axes) } else { fit.loss }
 }
 
 /// The loss of a model on the axes that the last effect of another one acts on.
-fn loss_where_last_acts(engine: &Engine<'_>, model: &Refit, other: &Refit) -> f64 {
+fn loss_where_last_acts(engine: &Engine<'_>, model: &FittedModel, other: &FittedModel) -> f64 {
     loss_on(engine, axes_of(other.effects.last().map_or(&[], std::slice::from_ref)), model)
 }
 
@@ -327,7 +327,7 @@ fn lacks_fit(engine: &Engine<'_>, loss: f64) -> bool {
 }
 
 /// Whether a model leaves more than noise on one of the axes, where each counts: the other one would hide it in the sum.
-fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &Refit) -> bool {
+fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &FittedModel) -> bool {
     let lacks_on = |axes| {
         let (loss, dof) = engine.loss_on(axes, &model.squares);
         loss > lack_of_fit_per_dof(engine.is_linked()) * dof
@@ -389,7 +389,11 @@ fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<
 }
 
 /// Screens all candidates against a model's residual, with the derivatives of its effects as extra columns.
-fn screen_again(engine: &Engine<'_>, columns: &Columns, model: &Refit) -> (f64, Vec<ScreenedCandidate>) {
+fn screen_again(
+    engine: &Engine<'_>,
+    columns: &Columns,
+    model: &FittedModel,
+) -> (f64, Vec<ScreenedCandidate>) {
     let linearisation = linearise(engine, model);
     let rig = rig_of(&engine.rig, &model.effects, &model.factors).expect("a model that was fitted is a rig");
     let simulated = engine.simulate(&rig);

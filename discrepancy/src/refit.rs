@@ -41,7 +41,7 @@ pub struct EffectEstimate {
 
 /// A fitted model: effects and parameters.
 #[derive(Clone, Debug)]
-pub struct Refit {
+pub struct FittedModel {
     /// In the order in which they joined.
     pub effects: Vec<EffectEstimate>,
     /// Factors of the baseline parameters, in the order of [`PARAMETERS`]; 1 is the rig file's value.
@@ -60,7 +60,7 @@ pub struct Refit {
     pub(crate) convergence: Convergence,
 }
 
-impl Refit {
+impl FittedModel {
     /// The same with the standard errors of its parameters widened by tau, their standard deviation between the windows.
     pub(crate) fn widened(&self, tau: &[f64; COUNT]) -> Self {
         let mut wider = self.clone();
@@ -70,7 +70,7 @@ impl Refit {
     }
 }
 
-impl Iterate for Refit {
+impl Iterate for FittedModel {
     fn loss(&self) -> f64 {
         self.loss
     }
@@ -208,7 +208,7 @@ pub(crate) fn refit(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
     start: &[EffectEstimate],
-) -> Option<Refit> {
+) -> Option<FittedModel> {
     refit_steps(engine, linearisation, start, CANDIDATE.steps)
 }
 
@@ -218,7 +218,7 @@ pub(crate) fn refit_steps(
     linearisation: &Linearisation,
     start: &[EffectEstimate],
     steps: usize,
-) -> Option<Refit> {
+) -> Option<FittedModel> {
     let parameters: Vec<usize> = (0..COUNT).collect();
     let (precisions, off) = (parameter_precisions(), linearisation.deviations());
     let all_precisions = prior_precisions(start);
@@ -305,11 +305,11 @@ pub(crate) fn refit_steps(
     }
     let loss = iterate.loss() + model_penalty(coordinates.len(), &factors);
     let ProjectedFit { effects, fit, .. } = iterate;
-    Some(Refit { effects, factors, loss, squares: fit.squares, errors, design_effect, convergence })
+    Some(FittedModel { effects, factors, loss, squares: fit.squares, errors, design_effect, convergence })
 }
 
 /// Parameter sensitivities linearised at a model.
-pub(crate) fn linearise(engine: &Engine<'_>, model: &Refit) -> Linearisation {
+pub(crate) fn linearise(engine: &Engine<'_>, model: &FittedModel) -> Linearisation {
     linearise_at(engine, &model.effects, model.factors)
 }
 
@@ -325,19 +325,19 @@ pub(crate) fn linearise_at(
 
 /// Refits a model with the parameters linearised anew at its own values; `None` where the loss does not fall, an error where no
 /// rig can have it.
-fn linearised_anew(engine: &Engine<'_>, model: &Refit) -> Result<Option<Refit>, ()> {
+fn linearised_anew(engine: &Engine<'_>, model: &FittedModel) -> Result<Option<FittedModel>, ()> {
     let next = refit(engine, &linearise(engine, model), &model.effects).ok_or(())?;
     let convergence = model.convergence.then(next.convergence);
-    Ok((next.loss < model.loss).then_some(Refit { convergence, ..next }))
+    Ok((next.loss < model.loss).then_some(FittedModel { convergence, ..next }))
 }
 
 /// The same once; the model itself where the loss does not fall.
-pub(crate) fn relinearise_once(engine: &Engine<'_>, model: Refit) -> Refit {
+pub(crate) fn relinearise_once(engine: &Engine<'_>, model: FittedModel) -> FittedModel {
     linearised_anew(engine, &model).ok().flatten().unwrap_or(model)
 }
 
 /// The same until the loss converges.
-pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, options: Options) -> Refit {
+pub(crate) fn relinearise(engine: &Engine<'_>, model: FittedModel, options: Options) -> FittedModel {
     let (fit, outer) =
         Estimator::new(options).descend(model, |_, best| match linearised_anew(engine, best) {
             Err(()) => Step::Impossible,
@@ -345,7 +345,7 @@ pub(crate) fn relinearise(engine: &Engine<'_>, model: Refit, options: Options) -
             Ok(None) => Step::Refused { predicted_reduction: 0.0 },
         });
     if outer.outcome == Outcome::StepLimit {
-        return Refit { convergence: Convergence { outcome: outer.outcome, ..fit.convergence }, ..fit };
+        return FittedModel { convergence: Convergence { outcome: outer.outcome, ..fit.convergence }, ..fit };
     }
     fit
 }
@@ -397,7 +397,7 @@ mod tests {
         let fit = |factor: f64| {
             let mut factors = [1.0; COUNT];
             factors[2] = factor;
-            Refit {
+            FittedModel {
                 effects: Vec::new(),
                 factors,
                 loss: 0.0,

@@ -23,7 +23,7 @@ use crate::locate::maps::map;
 use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
 use crate::name::{MIN_LOSS_REDUCTION, share_removed};
 use crate::parameters::{COUNT, with_factors};
-use crate::refit::Refit;
+use crate::refit::FittedModel;
 use crate::report::{Quantity, TableTerm, UncataloguedTerm};
 use fit::{FittedTable, Iterate, LinearisedTable, Model, TableLinearisation};
 use plant::effects::tabulated::{self, Balance, Tabulated, Variable, interpolated};
@@ -57,8 +57,8 @@ pub(crate) struct Tables {
 /// Tables for an unknown input, or the reason why there are none; `reported` is the calibration with the needed parameters.
 pub(crate) fn tabulate(
     engine: &Engine<'_>,
-    calibrated: &Refit,
-    reported: &Refit,
+    calibrated: &FittedModel,
+    reported: &FittedModel,
     outside: &UncataloguedTerm,
     unknowns: &[UnknownSeries],
     progress: &mut dyn FnMut(&str),
@@ -96,10 +96,10 @@ pub(crate) fn tabulate(
     if linearisation.cross_validated_loss(engine, &best) > unseen - LEAST_SHARE * unseen.abs() {
         return Err("its table leaves windows that it was not fitted on no better".to_owned());
     }
-    let refit = best.as_refit(engine, &linearisation);
+    let fitted = best.as_fitted_model(engine, &linearisation);
     Ok(Tables {
         terms: best.model.tables.iter().map(|table| term(&table.table)).collect(),
-        parameters: (0..COUNT).filter(|at| off[*at]).map(|at| quantity(engine, at, &refit)).collect(),
+        parameters: (0..COUNT).filter(|at| off[*at]).map(|at| quantity(engine, at, &fitted)).collect(),
         share_explained: share_removed(parameters_alone.loss, best.loss),
     })
 }

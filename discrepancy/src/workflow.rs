@@ -21,7 +21,7 @@ use crate::name::{SelectionResult, on_all};
 use crate::outside::outside;
 use crate::page::Pictures;
 use crate::parameters::{COUNT, with_factors};
-use crate::refit::{Refit, rig_of};
+use crate::refit::{FittedModel, rig_of};
 use crate::report::{self, DeclaredSuspect, InputFiles, LocatedTerm, NamedEffect, Report, Verdict};
 use crate::suspects::Suspect;
 use crate::tabulate::{tables, tabulate};
@@ -241,7 +241,7 @@ pub fn close(task: &Task, progress: &mut dyn FnMut(&str)) -> Result<Outcome, Wor
 
 /// The inadequate model, or the effect nearest to what is outside the catalogue, beside which more is missing; `None` where
 /// [`Report::outside`] has it already.
-fn remaining_beside<'a>(report: &Report, found: &'a SelectionResult) -> Option<&'a Refit> {
+fn remaining_beside<'a>(report: &Report, found: &'a SelectionResult) -> Option<&'a FittedModel> {
     match report.verdict {
         Verdict::OutsideCatalogue if report.nearest.is_none() => None,
         Verdict::OutsideCatalogue => Some(&found.model),

@@ -13,7 +13,7 @@ use super::UNRESOLVED;
 use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::{Fit, Products};
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{MOST_OFF, Refit, parameter_precisions};
+use crate::refit::{FittedModel, MOST_OFF, parameter_precisions};
 use crate::report::Quantity;
 use model_fit::estimator::{CALIBRATION, Estimator, Iterate};
 use plant::RigParameters;
@@ -66,7 +66,7 @@ pub struct TableCalibration {
 }
 
 /// Fits entries and parameters jointly; `None` where no rig can have the result.
-pub fn calibrate_tables(engine: &Engine<'_>, calibrated: &Refit) -> Option<TableCalibration> {
+pub fn calibrate_tables(engine: &Engine<'_>, calibrated: &FittedModel) -> Option<TableCalibration> {
     let rig = &engine.rig;
     let scale = PARAMETERS.iter().position(|parameter| parameter.name == KV_SCALE).expect("one of them");
     let entries = entries(rig, &calibrated.factors);
@@ -102,9 +102,12 @@ pub fn calibrate_tables(engine: &Engine<'_>, calibrated: &Refit) -> Option<Table
 
     let mut parameter_factors = [1.0; COUNT];
     parameter_factors.copy_from_slice(&factors[..COUNT]);
-    let refit =
-        Refit { factors: parameter_factors, errors: factor_errors[..COUNT].to_vec(), ..calibrated.clone() };
-    let parameters: Vec<Quantity> = (0..COUNT).map(|at| super::quantity(engine, at, &refit)).collect();
+    let fitted = FittedModel {
+        factors: parameter_factors,
+        errors: factor_errors[..COUNT].to_vec(),
+        ..calibrated.clone()
+    };
+    let parameters: Vec<Quantity> = (0..COUNT).map(|at| super::quantity(engine, at, &fitted)).collect();
     let mut quantities = parameters.clone();
     let mut changed: Vec<Quantity> = parameters
         .into_iter()

@@ -24,7 +24,7 @@ use super::needed_parameters::{significantly_off, with_needed};
 use super::{axes_of, is_large, loss_on};
 use crate::engine::Engine;
 use crate::parameters::COUNT;
-use crate::refit::{EffectEstimate, Refit, linearise};
+use crate::refit::{EffectEstimate, FittedModel, linearise};
 use crate::report::ExplanationKind;
 
 /// Probability from which on an explanation decides: it is right more often than all others together.
@@ -80,7 +80,7 @@ impl NotExplained {
 pub(super) struct SearchOutcome {
     pub(super) selection: Selection,
     /// Its rounds before effects were eliminated.
-    pub(super) all_rounds: Vec<Vec<Refit>>,
+    pub(super) all_rounds: Vec<Vec<FittedModel>>,
     /// Of its model, on the searched part of the records.
     pub(super) lacks_fit: bool,
     /// Whether an effect joined because its amplitude is homogeneous over windows: the model may need many parameters then.
@@ -95,12 +95,12 @@ pub(super) struct Decision {
     pub(super) shares: Vec<f64>,
     pub(super) is_named: Vec<bool>,
     /// The model without the parameters that it does not need, where it is an explanation.
-    pub(super) explained: Result<Refit, NotExplained>,
+    pub(super) explained: Result<FittedModel, NotExplained>,
 }
 
 impl Decision {
     /// The model whose effects are to be named.
-    pub(super) fn to_be_named(&self) -> Option<&Refit> {
+    pub(super) fn to_be_named(&self) -> Option<&FittedModel> {
         Some(&self.selection.model).filter(|_| self.explained.is_ok() && self.is_named.contains(&true))
     }
 
@@ -186,24 +186,25 @@ pub(super) fn decide(engine: &Engine<'_>, explanations: &[Explanation], searched
 ///
 /// The loss alone would choose an effect of the axis that fits worst, beside a background often another one than that of the
 /// missing law.
-fn nearest<'a>(all_rounds: &'a [Vec<Refit>], explanations: &[Explanation]) -> Option<&'a Refit> {
+fn nearest<'a>(all_rounds: &'a [Vec<FittedModel>], explanations: &[Explanation]) -> Option<&'a FittedModel> {
     let singles = all_rounds.first()?;
     let effects = explanations.iter().filter(|one| one.kind == ExplanationKind::Effects);
     let probable = effects.max_by(|left, right| left.probability.total_cmp(&right.probability));
-    let is_in =
-        |single: &&Refit, set: &[EffectEstimate]| single.effects.iter().all(|effect| has_effect(set, effect));
+    let is_in = |single: &&FittedModel, set: &[EffectEstimate]| {
+        single.effects.iter().all(|effect| has_effect(set, effect))
+    };
     let of_set = probable.and_then(|one| one.sets.first());
     of_set.and_then(|set| singles.iter().find(|single| is_in(single, set))).or_else(|| singles.first())
 }
 
 /// Number of parameters that a model has significantly off.
-fn significantly_off_count(engine: &Engine<'_>, model: &Refit) -> usize {
+fn significantly_off_count(engine: &Engine<'_>, model: &FittedModel) -> usize {
     let tau = parameter_tau(engine, &linearise(engine, model), model).unwrap_or([0.0; COUNT]);
     significantly_off(engine, &model.widened(&tau)).into_iter().filter(|is_off| *is_off).count()
 }
 
 /// Whether the effects of the search's model are less probable than the null model or than [`LEAST_PROBABLE`].
-fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
+fn is_improbable(model: &FittedModel, explanations: &[Explanation]) -> bool {
     let large: Vec<_> = model.effects.iter().filter(|effect| is_large(effect)).collect();
     let null = explanations.iter().find(|one| one.kind == ExplanationKind::Null);
     let least = null.map_or(LEAST_PROBABLE, |null| null.probability.max(LEAST_PROBABLE));
@@ -215,10 +216,10 @@ fn is_improbable(model: &Refit, explanations: &[Explanation]) -> bool {
 
 impl Selection {
     /// The rounds in which the effects of a fit joined: it is the best of the last one, beside others that are hardly worse.
-    fn rounds_of(&self, fit: &Refit, all_rounds: &[Vec<Refit>]) -> Vec<Vec<Refit>> {
+    fn rounds_of(&self, fit: &FittedModel, all_rounds: &[Vec<FittedModel>]) -> Vec<Vec<FittedModel>> {
         let last = fit.effects.len().saturating_sub(1);
         let others = all_rounds.get(last).map_or(&[][..], Vec::as_slice);
-        let mut rounds: Vec<Vec<Refit>> = all_rounds.iter().take(last).cloned().collect();
+        let mut rounds: Vec<Vec<FittedModel>> = all_rounds.iter().take(last).cloned().collect();
         rounds.push([vec![fit.clone()], self.close_alternatives(fit, others)].concat());
         rounds
     }
@@ -245,8 +246,8 @@ mod tests {
         EffectEstimate { candidate, coordinates }
     }
 
-    fn model_of(effects: Vec<EffectEstimate>) -> Refit {
-        Refit {
+    fn model_of(effects: Vec<EffectEstimate>) -> FittedModel {
+        FittedModel {
             effects,
             factors: [1.0; COUNT],
             loss: 0.0,

@@ -3,7 +3,7 @@
 use super::null_distribution::NullDistribution;
 use super::{Alternative, STEPS, THRESHOLD_FACTOR_SINGLE, axes_of, loss_on, relinearise};
 use crate::engine::Engine;
-use crate::refit::{EffectEstimate, Refit, linearise, refit_steps};
+use crate::refit::{EffectEstimate, FittedModel, linearise, refit_steps};
 use crate::screen::Columns;
 use model_fit::parallel;
 
@@ -23,10 +23,10 @@ const MIN_SHARE_OF_REDUCTION: f64 = 0.002;
 #[derive(Clone)]
 pub(super) struct Selection {
     /// Parameters without effects.
-    pub(super) calibrated: Refit,
-    pub(super) model: Refit,
+    pub(super) calibrated: FittedModel,
+    pub(super) model: FittedModel,
     /// For each effect of the model the fits of its round, best first.
-    pub(super) rounds: Vec<Vec<Refit>>,
+    pub(super) rounds: Vec<Vec<FittedModel>>,
 }
 
 impl Selection {
@@ -64,9 +64,9 @@ impl Selection {
     }
 
     /// Those of other fits whose loss differs from that of a fit by hardly anything.
-    pub(super) fn close_alternatives(&self, fit: &Refit, others: &[Refit]) -> Vec<Refit> {
+    pub(super) fn close_alternatives(&self, fit: &FittedModel, others: &[FittedModel]) -> Vec<FittedModel> {
         let (most, last) = (self.alike(fit), fit.effects.last());
-        let is_close = |other: &&Refit| {
+        let is_close = |other: &&FittedModel| {
             let is_it =
                 other.effects.last().zip(last).is_some_and(|(other, last)| is_same_effect(other, last));
             !is_it && (other.loss - fit.loss).abs() < most
@@ -75,7 +75,7 @@ impl Selection {
     }
 
     /// Largest difference in loss at which an explanation is indistinguishable from the best.
-    fn alike(&self, best: &Refit) -> f64 {
+    fn alike(&self, best: &FittedModel) -> f64 {
         (INDISTINGUISHABLE_LOSS_DIFFERENCE * best.design_effect)
             .max(INDISTINGUISHABLE_LOSS_SHARE * best.loss.min(self.calibrated.loss - best.loss))
     }
@@ -125,7 +125,7 @@ impl Selection {
             return Vec::new();
         };
         let best = &refits[0];
-        let is_new = |fit: &Refit| {
+        let is_new = |fit: &FittedModel| {
             fit.effects.last().is_some_and(|other| {
                 !self.model.effects.iter().any(|of_model| is_same_effect(of_model, other))
             })

@@ -18,7 +18,7 @@ use super::{
 use crate::engine::Engine;
 use crate::fit;
 use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, parameter_precisions};
+use crate::refit::{EffectEstimate, FittedModel, Linearisation, linearise, parameter_precisions};
 use crate::report::{ExplanationKind, Features, Marginal};
 use crate::screen::Columns;
 
@@ -37,7 +37,7 @@ pub struct Explanation {
     /// Of the best set, or of the model without effects; `None` for none of these.
     pub features: Option<Features>,
     /// Of the best set of effects, small ones beside them included.
-    pub(super) fit: Option<Refit>,
+    pub(super) fit: Option<FittedModel>,
     /// All sum to one.
     pub(crate) probability: f64,
     /// The second rule; none for linked rods.
@@ -46,10 +46,10 @@ pub struct Explanation {
 
 /// The fits that explanations are made of.
 pub(super) struct Fits<'a> {
-    pub(super) parameters: &'a Refit,
+    pub(super) parameters: &'a FittedModel,
     /// Of the selection.
-    pub(super) model: &'a Refit,
-    pub(super) fitted: &'a [Refit],
+    pub(super) model: &'a FittedModel,
+    pub(super) fitted: &'a [FittedModel],
 }
 
 /// All explanations that were fitted: nothing, parameters, the best sets of effects, none of these.
@@ -135,7 +135,7 @@ fn parameters_moved(factors: &[f64; COUNT]) -> f64 {
 }
 
 /// Its effects that are large enough to be named.
-fn large(fit: &Refit) -> Vec<EffectEstimate> {
+fn large(fit: &FittedModel) -> Vec<EffectEstimate> {
     fit.effects.iter().filter(|effect| is_large(effect)).cloned().collect()
 }
 
@@ -143,11 +143,11 @@ fn large(fit: &Refit) -> Vec<EffectEstimate> {
 fn classes<'a>(
     fits: &Fits<'a>,
     are_alike: impl Fn(&EffectEstimate, &EffectEstimate) -> bool,
-) -> Vec<Vec<&'a Refit>> {
-    let mut all: Vec<&Refit> = fits.fitted.iter().collect();
+) -> Vec<Vec<&'a FittedModel>> {
+    let mut all: Vec<&FittedModel> = fits.fitted.iter().collect();
     all.sort_by(|left, right| left.loss.total_cmp(&right.loss));
     all.insert(0, fits.model);
-    let mut classes: Vec<Vec<&Refit>> = Vec::new();
+    let mut classes: Vec<Vec<&FittedModel>> = Vec::new();
     for fit in all {
         if large(fit).is_empty()
             || classes.iter().flatten().any(|other| has_all(other, fit) && has_all(fit, other))
@@ -164,17 +164,17 @@ fn classes<'a>(
 }
 
 /// Whether a model has all large effects of another one among its own.
-fn has_all(model: &Refit, other: &Refit) -> bool {
+fn has_all(model: &FittedModel, other: &FittedModel) -> bool {
     let large_of_model = large(model);
     large(other).iter().all(|effect| large_of_model.iter().any(|of_model| is_same_effect(of_model, effect)))
 }
 
 fn differ_by_alike(
-    left: &Refit,
-    right: &Refit,
+    left: &FittedModel,
+    right: &FittedModel,
     are_alike: impl Fn(&EffectEstimate, &EffectEstimate) -> bool,
 ) -> bool {
-    let only = |of: &Refit, other: &Refit| -> Vec<EffectEstimate> {
+    let only = |of: &FittedModel, other: &FittedModel| -> Vec<EffectEstimate> {
         let others = large(other);
         large(of)
             .into_iter()
@@ -196,7 +196,12 @@ struct ResponseSimilarity<'a> {
 
 impl<'a> ResponseSimilarity<'a> {
     /// With the weights of a model's windows.
-    fn new(engine: &Engine<'_>, linearisation: &Linearisation, columns: &'a Columns, model: &Refit) -> Self {
+    fn new(
+        engine: &Engine<'_>,
+        linearisation: &Linearisation,
+        columns: &'a Columns,
+        model: &FittedModel,
+    ) -> Self {
         let probes = (0..columns.count()).map(|index| columns.column(index));
         let all: Vec<&[f64]> = linearisation.columns.iter().map(Vec::as_slice).chain(probes).collect();
         let products = engine.products(&vec![0.0; all[0].len()], &all);
@@ -241,7 +246,7 @@ mod tests {
     use crate::candidates::Candidate;
     use plant::RigParameters;
 
-    fn fit(names: &[&str], loss: f64) -> Refit {
+    fn fit(names: &[&str], loss: f64) -> FittedModel {
         let all = Candidate::all(&RigParameters::baseline(), [true, false], false, &[]);
         let effect = |name: &&str| {
             let candidate = *all.iter().find(|candidate| candidate.sheet.name == *name).unwrap();
@@ -249,7 +254,7 @@ mod tests {
             coordinates[0] = 1.0;
             EffectEstimate { candidate, coordinates }
         };
-        Refit {
+        FittedModel {
             effects: names.iter().map(effect).collect(),
             factors: [1.0; COUNT],
             loss,

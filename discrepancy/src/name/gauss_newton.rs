@@ -16,8 +16,8 @@ use crate::engine::Engine;
 use crate::fit::{Fit, Products, loss};
 use crate::parameters::COUNT;
 use crate::refit::{
-    EffectEstimate, MOST_OFF, Refit, coordinate_columns, has_factor_at_bound, is_at_bound, model_penalty,
-    prior_deviations, prior_precisions, rig_of,
+    EffectEstimate, FittedModel, MOST_OFF, coordinate_columns, has_factor_at_bound, is_at_bound,
+    model_penalty, prior_deviations, prior_precisions, rig_of,
 };
 use model_fit::estimator::{Estimator, Iterate, JOINT, JOINT_COMPARED, Options, Step};
 use model_fit::parallel;
@@ -33,7 +33,7 @@ const SHRINK_FACTORS: [f64; 4] = [1.0, 0.6, 0.3, 0.0];
 
 /// Factors with all deviations from the rig file scaled by the fraction with the smallest simulated loss. While an effect is
 /// missing, the linearised step may lead far off.
-pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COUNT] {
+pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &FittedModel) -> [f64; COUNT] {
     let tried = SHRINK_FACTORS.map(|shrink| model.factors.map(|factor| 1.0 + shrink * (factor - 1.0)));
     let loss = |factors: &[f64; COUNT]| {
         iterate(engine, model.effects.clone(), *factors).map_or(f64::INFINITY, |iterate| iterate.loss)
@@ -45,7 +45,7 @@ pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &Refit) -> [f64; COU
 
 /// Fits all parameters and coordinates of a model in the simulator, penalties included; returns the model itself where the loss
 /// does not fall.
-pub(super) fn fit_all(engine: &Engine<'_>, model: &Refit) -> Refit {
+pub(super) fn fit_all(engine: &Engine<'_>, model: &FittedModel) -> FittedModel {
     let Some(mut fit) = fit_for_comparison(engine, model) else { return model.clone() };
     fit.loss += model_penalty(coordinates(&fit.effects), &fit.factors);
     if fit.loss < model.loss { fit } else { model.clone() }
@@ -74,16 +74,25 @@ impl Iterate for SimulatedModel {
 
 /// Fits a model in the simulator with the parameters that are not `needed` at the rig file's values; `None` where no rig can have
 /// it. Its loss has the priors and no penalties.
-pub(super) fn fit_selected(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT]) -> Option<Refit> {
+pub(super) fn fit_selected(
+    engine: &Engine<'_>,
+    model: &FittedModel,
+    needed: &[bool; COUNT],
+) -> Option<FittedModel> {
     fit_within(engine, model, needed, JOINT)
 }
 
 /// The same with all parameters, to compare models: of an inexact one the last steps do not count.
-pub(super) fn fit_for_comparison(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
+pub(super) fn fit_for_comparison(engine: &Engine<'_>, model: &FittedModel) -> Option<FittedModel> {
     fit_within(engine, model, &[true; COUNT], JOINT_COMPARED)
 }
 
-fn fit_within(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT], options: Options) -> Option<Refit> {
+fn fit_within(
+    engine: &Engine<'_>,
+    model: &FittedModel,
+    needed: &[bool; COUNT],
+    options: Options,
+) -> Option<FittedModel> {
     let mut factors = model.factors;
     for (factor, _) in factors.iter_mut().zip(needed).filter(|(_, needed)| !**needed) {
         *factor = 1.0;
@@ -98,7 +107,15 @@ fn fit_within(engine: &Engine<'_>, model: &Refit, needed: &[bool; COUNT], option
     });
     let errors = errors(engine, &linearised(engine, &iterate)?, &iterate);
     let SimulatedModel { effects, factors, squares, loss, .. } = iterate;
-    Some(Refit { effects, factors, loss, squares, errors, design_effect: model.design_effect, convergence })
+    Some(FittedModel {
+        effects,
+        factors,
+        loss,
+        squares,
+        errors,
+        design_effect: model.design_effect,
+        convergence,
+    })
 }
 
 fn iterate(
@@ -244,7 +261,7 @@ fn step_by(
     iterate(engine, effects, factors)
 }
 
-/// Standard errors with all parameters free, in the order of [`Refit::errors`]: the same records selected the needed ones.
+/// Standard errors with all parameters free, in the order of [`FittedModel::errors`]: the same records selected the needed ones.
 fn errors(engine: &Engine<'_>, linearisation: &JointLinearisation, iterate: &SimulatedModel) -> Vec<f64> {
     let products = linearisation.products(engine, iterate, &[]);
     let all: Vec<usize> = (0..products.columns).collect();

@@ -21,7 +21,7 @@ use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::COUNT;
 use crate::refit::{
-    Linearisation, Refit, coordinate_columns, linearise, prior_precisions, refit_steps, rig_of,
+    FittedModel, Linearisation, coordinate_columns, linearise, prior_precisions, refit_steps, rig_of,
 };
 use model_fit::parallel;
 
@@ -45,22 +45,22 @@ const MIN_LOSS_SHARE: f64 = 0.1;
 pub(super) fn prefer_homogeneous(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    before: &Refit,
-    fits: &mut Vec<Refit>,
+    before: &FittedModel,
+    fits: &mut Vec<FittedModel>,
 ) -> bool {
-    let gain = |fit: &Refit| before.loss - fit.loss;
+    let gain = |fit: &FittedModel| before.loss - fit.loss;
     let Some(most) = fits.first().map(gain) else { return false };
-    let needed = |fit: &Refit| {
+    let needed = |fit: &FittedModel| {
         let share = MIN_LOSS_SHARE * loss_where_last_acts(engine, before, fit);
         share.max(MIN_LOSS_REDUCTION).max(MIN_GAIN_SHARE * most)
     };
-    let is_homogeneous = |fit: &Refit| {
+    let is_homogeneous = |fit: &FittedModel| {
         let variation = amplitude_variation(engine, linearisation, fit);
         variation.and_then(|all| all.last().copied()).is_some_and(|variation| variation < MAX_CV_IN_SEARCH)
     };
     let compared = &fits[..fits.len().min(COMPARED)];
     let stays = parallel::map(compared, |fit| gain(fit) > needed(fit) && is_homogeneous(fit));
-    let homogeneous: Vec<Refit> =
+    let homogeneous: Vec<FittedModel> =
         compared.iter().zip(stays).filter(|(_, stays)| *stays).map(|(fit, _)| fit.clone()).collect();
     let found = !homogeneous.is_empty();
     if found {
@@ -70,9 +70,9 @@ pub(super) fn prefer_homogeneous(
 }
 
 /// Leaves the fits above the amplitude floor, where one of them is adequate or the model before them is.
-pub(super) fn prefer_large(engine: &Engine<'_>, before: &Refit, fits: &mut Vec<Refit>) {
-    let is_adequate = |fit: &Refit| !lacks_fit(engine, fit.loss);
-    let is_large = |fit: &Refit| fit.effects.last().is_some_and(is_large);
+pub(super) fn prefer_large(engine: &Engine<'_>, before: &FittedModel, fits: &mut Vec<FittedModel>) {
+    let is_adequate = |fit: &FittedModel| !lacks_fit(engine, fit.loss);
+    let is_large = |fit: &FittedModel| fit.effects.last().is_some_and(is_large);
     if is_adequate(before) || fits.iter().any(|fit| is_large(fit) && is_adequate(fit)) {
         fits.retain(is_large);
     }
@@ -112,7 +112,7 @@ pub(crate) struct Heterogeneity {
 fn amplitude_variation(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    model: &Refit,
+    model: &FittedModel,
 ) -> Option<Vec<f64>> {
     Some(heterogeneity(engine, linearisation, model)?.into_iter().map(|effect| effect.variation).collect())
 }
@@ -122,7 +122,7 @@ fn amplitude_variation(
 pub(super) fn heterogeneity(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    model: &Refit,
+    model: &FittedModel,
 ) -> Option<Vec<Heterogeneity>> {
     let windows = WindowwiseFits::new(engine, linearisation, model)?;
     let mut column = linearisation.columns.len();
@@ -144,7 +144,7 @@ pub(super) fn heterogeneity(
 pub(super) fn parameter_tau(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
-    model: &Refit,
+    model: &FittedModel,
 ) -> Option<[f64; COUNT]> {
     let mut tau = [0.0; COUNT];
     let moved: Vec<usize> = (0..COUNT).filter(|at| model.factors[*at] != 1.0).collect();
@@ -169,7 +169,7 @@ struct WindowwiseFits {
 }
 
 impl WindowwiseFits {
-    fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
+    fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &FittedModel) -> Option<Self> {
         let simulated = engine.simulate(&rig_of(&engine.rig, &model.effects, &model.factors)?);
         let residual = engine.residual(&simulated);
         let mut columns = linearisation.columns.clone();
@@ -185,7 +185,7 @@ impl WindowwiseFits {
     fn with_response(
         &self,
         engine: &Engine<'_>,
-        model: &Refit,
+        model: &FittedModel,
         effect: usize,
         column: usize,
     ) -> Option<Vec<(f64, f64)>> {

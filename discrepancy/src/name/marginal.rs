@@ -30,7 +30,9 @@ use crate::fit::evidence::{
     quadrature,
 };
 use crate::parameters::COUNT;
-use crate::refit::{EffectEstimate, Refit, coordinate_columns, linearise, parameter_precisions, rig_of};
+use crate::refit::{
+    EffectEstimate, FittedModel, coordinate_columns, linearise, parameter_precisions, rig_of,
+};
 use crate::report::{ExplanationKind, Marginal};
 use crate::windows::BLOCKS_PER_WINDOW;
 use model_fit::parallel;
@@ -55,7 +57,7 @@ const PARABOLIC: [f64; 2] = [0.5, 2.0];
 /// Gives each explanation its marginal likelihood and probability; none where one of them has no mode, and for linked rods.
 pub(super) fn weigh(
     engine: &Engine<'_>,
-    calibrated: &Refit,
+    calibrated: &FittedModel,
     candidates: usize,
     explanations: &mut [Explanation],
 ) {
@@ -69,7 +71,7 @@ pub(super) fn weigh(
 
 fn marginals(
     engine: &Engine<'_>,
-    calibrated: &Refit,
+    calibrated: &FittedModel,
     candidates: usize,
     explanations: &[Explanation],
 ) -> Option<Vec<Marginal>> {

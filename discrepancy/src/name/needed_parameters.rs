@@ -10,7 +10,7 @@
 use super::gauss_newton::{fit_for_comparison, fit_selected};
 use crate::engine::Engine;
 use crate::parameters::{COUNT, PARAMETERS};
-use crate::refit::{Refit, coordinate_columns, linearise, prior_precisions, rig_of};
+use crate::refit::{FittedModel, coordinate_columns, linearise, prior_precisions, rig_of};
 
 /// Rise of the loss at which a parameter is kept: three and a half standard errors.
 const NEEDED: f64 = 12.0;
@@ -25,7 +25,7 @@ const OFF_SHIFTS: f64 = 3.0;
 
 /// Which parameters of a model are significantly off the rig file's values: beyond their standard errors, and beyond what the
 /// error of integration shifts them by.
-pub(crate) fn significantly_off(engine: &Engine<'_>, model: &Refit) -> [bool; COUNT] {
+pub(crate) fn significantly_off(engine: &Engine<'_>, model: &FittedModel) -> [bool; COUNT] {
     let errors = &model.errors[model.errors.len() - COUNT..];
     let by = model.factors.map(|factor| (factor - 1.0).abs());
     let beyond_errors: [bool; COUNT] = std::array::from_fn(|at| is_significant(by[at], errors[at]));
@@ -43,7 +43,7 @@ fn is_significant(by: f64, error: f64) -> bool {
 
 /// Size of the change of each parameter when the model is fitted to itself simulated with half the step. `None` where it cannot
 /// be linearised.
-fn integration_shifts(engine: &Engine<'_>, model: &Refit) -> Option<[f64; COUNT]> {
+fn integration_shifts(engine: &Engine<'_>, model: &FittedModel) -> Option<[f64; COUNT]> {
     let rig = rig_of(&engine.rig, &model.effects, &model.factors)?;
     let simulated = engine.simulate(&rig);
     let mut columns = linearise(engine, model).columns;
@@ -59,7 +59,7 @@ fn integration_shifts(engine: &Engine<'_>, model: &Refit) -> Option<[f64; COUNT]
 
 /// The model refitted with the needed parameters only; with all of them where the loss of the refit rises by [`NEEDED`] or more
 /// for each parameter that is held.
-pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
+pub(super) fn with_needed(engine: &Engine<'_>, model: &FittedModel) -> FittedModel {
     let Some(all) = fit_for_comparison(engine, model) else { return model.clone() };
     let Some(needed) = needed(engine, &all) else { return all };
     let held = needed.iter().filter(|needed| !**needed).count();
@@ -70,7 +70,7 @@ pub(super) fn with_needed(engine: &Engine<'_>, model: &Refit) -> Refit {
 }
 
 /// Needed parameters by the linearised model; `None` where all are needed, or where no derivative exists.
-fn needed(engine: &Engine<'_>, model: &Refit) -> Option<[bool; COUNT]> {
+fn needed(engine: &Engine<'_>, model: &FittedModel) -> Option<[bool; COUNT]> {
     let linearisation = linearise(engine, model);
     let simulated = engine.simulate(&rig_of(&engine.rig, &model.effects, &model.factors)?);
     let coordinates = coordinate_columns(engine, &model.factors, &model.effects, &simulated)?;

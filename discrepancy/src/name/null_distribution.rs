@@ -7,7 +7,7 @@
 
 use crate::engine::Engine;
 use crate::parameters::COUNT;
-use crate::refit::{Linearisation, Refit, parameter_precisions, rig_of};
+use crate::refit::{FittedModel, Linearisation, parameter_precisions, rig_of};
 use crate::screen::Columns;
 use model_fit::stats::order_statistic;
 use rand_core::{Rng, SeedableRng};
@@ -38,7 +38,7 @@ impl NullDistribution {
         engine: &Engine<'_>,
         columns: &Columns,
         linearisation: &Linearisation,
-        model: &Refit,
+        model: &FittedModel,
     ) -> Self {
         let rig =
             rig_of(&engine.rig, &model.effects, &model.factors).expect("a model that was fitted is a rig");
@@ -70,7 +70,7 @@ impl NullDistribution {
     }
 
     /// Rise of the loss of a reduced model, without the outlying windows.
-    pub(super) fn loss_rise(&self, engine: &Engine<'_>, without: &Refit, model: &Refit) -> f64 {
+    pub(super) fn loss_rise(&self, engine: &Engine<'_>, without: &FittedModel, model: &FittedModel) -> f64 {
         let of = |window: &usize| {
             let [without, with] = [without, model].map(|fit| fit.squares[*window].max(f64::MIN_POSITIVE));
             engine.scaled_dof[*window] * (without / with).ln()

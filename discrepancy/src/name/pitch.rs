@@ -10,7 +10,7 @@ use super::STEPS;
 use crate::engine::Engine;
 use crate::parameters::COUNT;
 use crate::refit::{
-    Refit, coordinate_columns, coordinate_precision, linearise, prior_deviations, prior_precisions,
+    FittedModel, coordinate_columns, coordinate_precision, linearise, prior_deviations, prior_precisions,
     refit_steps, rig_of,
 };
 use model_fit::parallel;
@@ -21,11 +21,11 @@ const PITCHES: u32 = 40;
 const PROBE: f64 = 0.3;
 
 /// The model with the best pitch of its last effect, if it lowers the loss; unchanged for effects without a ripple.
-pub(super) fn at_best_pitch(engine: &Engine<'_>, model: &Refit) -> Refit {
+pub(super) fn at_best_pitch(engine: &Engine<'_>, model: &FittedModel) -> FittedModel {
     best(engine, model).filter(|other| other.loss < model.loss).unwrap_or_else(|| model.clone())
 }
 
-fn best(engine: &Engine<'_>, model: &Refit) -> Option<Refit> {
+fn best(engine: &Engine<'_>, model: &FittedModel) -> Option<FittedModel> {
     let candidate = model.effects.last()?.candidate;
     let key_of = |name: &str| candidate.sheet.keys.iter().position(|key| key.name == name);
     let (ripple, pitch) = (key_of("ripple_n")?, key_of("pitch_mm")?);

@@ -8,10 +8,10 @@
 use super::elimination::is_same_effect;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
-use super::start_states::{RefitWithInitialStates, backlash_start, refit_with_starts};
+use super::start_states::{FitWithStartStates, backlash_start, refit_with_starts};
 use super::{LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, lacks_fit, relinearise};
 use crate::engine::Engine;
-use crate::refit::{EffectEstimate, Linearisation, Refit, loss_at, refit_steps, relinearise_once};
+use crate::refit::{EffectEstimate, FittedModel, Linearisation, loss_at, refit_steps, relinearise_once};
 use crate::screen::{Columns, ScreenedCandidate};
 use model_fit::parallel;
 
@@ -62,7 +62,7 @@ impl Contenders {
         (loss_before, screened): (f64, Vec<ScreenedCandidate>),
         engine: &Engine<'_>,
         columns: &Columns,
-        model: &Refit,
+        model: &FittedModel,
         threshold: f64,
     ) -> [Option<Self>; 2] {
         let taken = |screened: &ScreenedCandidate| {
@@ -105,9 +105,9 @@ impl Contenders {
 
 /// Models with one more effect.
 pub(super) struct SelectionRound<'a> {
-    pub(super) fits: Vec<Refit>,
+    pub(super) fits: Vec<FittedModel>,
     /// Their relinearised refits, each with its start states.
-    restarted: Vec<RefitWithInitialStates<'a>>,
+    restarted: Vec<FitWithStartStates<'a>>,
 }
 
 impl<'a> SelectionRound<'a> {
@@ -117,7 +117,7 @@ impl<'a> SelectionRound<'a> {
         engine: &Engine<'a>,
         linearisation: &Linearisation,
         columns: &Columns,
-        model: &Refit,
+        model: &FittedModel,
         screening: (f64, Vec<ScreenedCandidate>),
         threshold: f64,
         progress: &mut dyn FnMut(&str),
@@ -150,7 +150,7 @@ impl<'a> SelectionRound<'a> {
     fn fitted(
         engine: &Engine<'a>,
         linearisation: &Linearisation,
-        model: &Refit,
+        model: &FittedModel,
         contenders: &Contenders,
         progress: &mut dyn FnMut(&str),
     ) -> Option<Self> {
@@ -159,12 +159,12 @@ impl<'a> SelectionRound<'a> {
             let start = best_start(engine, linearisation, &model.effects, screened, *loss_before);
             refit_steps(engine, linearisation, &start, STEPS)
         });
-        let mut fits: Vec<Refit> = fits.into_iter().flatten().collect();
+        let mut fits: Vec<FittedModel> = fits.into_iter().flatten().collect();
         sort(&mut fits);
         // These fits used the sensitivities of the model without the effect; the best are relinearised. Gains compare with the
         // null loss of the same sensitivities.
         let gain = loss_before - fits.first()?.loss;
-        let is_near = |fit: &&Refit| loss_before - fit.loss >= 0.5 * gain;
+        let is_near = |fit: &&FittedModel| loss_before - fit.loss >= 0.5 * gain;
         let near = fits.iter().take(MAX_RELINEARISED_FITS).filter(is_near).count().max(1);
         let once = parallel::map(&fits[..near], |fit| relinearise_once(engine, at_best_pitch(engine, fit)));
         let most = once.iter().map(|fit| loss_before - fit.loss).fold(0.0, f64::max);
@@ -190,9 +190,9 @@ impl<'a> SelectionRound<'a> {
 
     /// Where several fits are close, fits all numbers of each in the simulator: with linearised parameters, a wrong effect that
     /// moves all parameters may beat the right one.
-    fn refit_close_jointly(&mut self, engine: &Engine<'a>, model: &Refit) {
+    fn refit_close_jointly(&mut self, engine: &Engine<'a>, model: &FittedModel) {
         let Some(best) = self.fits.first().map(|fit| fit.loss) else { return };
-        let is_close = |fit: &&Refit| fit.loss - best < CLOSE * (model.loss - best);
+        let is_close = |fit: &&FittedModel| fit.loss - best < CLOSE * (model.loss - best);
         let close = self.fits.iter().take(MAX_RELINEARISED_FITS).filter(is_close).count();
         if close < 2 || engine.is_linked() {
             return;
@@ -207,7 +207,7 @@ impl<'a> SelectionRound<'a> {
         &mut self,
         engine: &Engine<'a>,
         linearisation: &Linearisation,
-        model: &Refit,
+        model: &FittedModel,
         backlash: &ScreenedCandidate,
     ) {
         let start = backlash_start(engine, linearisation, &model.effects, &backlash.start);
@@ -216,7 +216,7 @@ impl<'a> SelectionRound<'a> {
         };
         let restarted = refit_with_starts(engine, &relinearise(engine, fit));
         // The fit from the screened width is the same effect, not an alternative.
-        let is_backlash = |other: &Refit| {
+        let is_backlash = |other: &FittedModel| {
             other.effects.last().is_some_and(|effect| is_same_effect(effect, &backlash.start))
         };
         if self.fits.iter().filter(|other| is_backlash(other)).all(|other| restarted.fit.loss < other.loss) {
@@ -236,7 +236,7 @@ impl<'a> SelectionRound<'a> {
     }
 }
 
-fn sort(fits: &mut [Refit]) {
+fn sort(fits: &mut [FittedModel]) {
     fits.sort_by(|left, right| left.loss.total_cmp(&right.loss));
 }
 

@@ -26,7 +26,8 @@ use super::{MIN_LOSS_REDUCTION, is_large, lacks_fit};
 use crate::engine::Engine;
 use crate::fit::{MIN_CHI2_PER_DOF, Products, loss};
 use crate::refit::{
-    EffectEstimate, Linearisation, Refit, coordinate_columns, prior_deviations, prior_precisions, rig_of,
+    EffectEstimate, FittedModel, Linearisation, coordinate_columns, prior_deviations, prior_precisions,
+    rig_of,
 };
 use crate::report::{DrawnRecords, EffectPlace, ExplanationKind, Significance, StoppingReason, effect_place};
 use crate::screen::{COLUMN_PENALTY, Columns};
@@ -55,7 +56,7 @@ pub(super) struct Fitted<'a> {
     pub(super) linearisation: &'a Linearisation,
     pub(super) columns: &'a Columns,
     /// Parameters alone.
-    pub(super) calibrated: &'a Refit,
+    pub(super) calibrated: &'a FittedModel,
     pub(super) explanations: &'a [Explanation],
     /// Of the null distribution of signs.
     pub(super) threshold: f64,
@@ -63,7 +64,7 @@ pub(super) struct Fitted<'a> {
 
 impl Fitted<'_> {
     /// Tests a model whose effects are to be named.
-    pub(super) fn significance(&self, model: &Refit) -> Option<Significance> {
+    pub(super) fn significance(&self, model: &FittedModel) -> Option<Significance> {
         let gains = window_gains(&self.engine.scaled_dof, &self.calibrated.squares, &model.squares);
         let penalty = COLUMN_PENALTY * coordinates(&model.effects) as f64;
         let gain = gains.iter().sum::<f64>() - penalty;
@@ -96,7 +97,7 @@ impl Fitted<'_> {
     }
 
     /// Records drawn with parameters alone; `None` where no rig has them.
-    fn drawn_under_null(&self, model: &Refit, gain: f64) -> Option<DrawnRecords> {
+    fn drawn_under_null(&self, model: &FittedModel, gain: f64) -> Option<DrawnRecords> {
         let engine = self.engine;
         let generating = GeneratingModel::new(engine, self.calibrated)?;
         // Whatever the factors, these columns span what parameters do; priors count from where the factors are.
@@ -118,7 +119,7 @@ impl Fitted<'_> {
     }
 
     /// The other set of effects among the two most probable explanations.
-    fn other(&self, model: &Refit) -> Option<&Refit> {
+    fn other(&self, model: &FittedModel) -> Option<&FittedModel> {
         let mut ranked: Vec<&Explanation> = self.explanations.iter().collect();
         ranked.sort_by(|left, right| right.probability.total_cmp(&left.probability));
         let large: Vec<&EffectEstimate> = model.effects.iter().filter(|effect| is_large(effect)).collect();
@@ -129,7 +130,7 @@ impl Fitted<'_> {
     }
 
     /// Records drawn with another set of effects; `None` where no derivative exists.
-    fn against(&self, model: &Refit, other: &Refit, draws: usize) -> Option<DrawnRecords> {
+    fn against(&self, model: &FittedModel, other: &FittedModel, draws: usize) -> Option<DrawnRecords> {
         let dof = &self.engine.scaled_dof;
         let generating = GeneratingModel::new(self.engine, other)?;
         let [model_step, other_step] =
@@ -153,7 +154,7 @@ struct GeneratingModel<'a> {
 }
 
 impl<'a> GeneratingModel<'a> {
-    fn new(engine: &'a Engine<'a>, model: &Refit) -> Option<Self> {
+    fn new(engine: &'a Engine<'a>, model: &FittedModel) -> Option<Self> {
         let rig = rig_of(&engine.rig, &model.effects, &model.factors)?;
         let simulated = engine.simulate(&rig);
         Some(GeneratingModel { engine, rig, simulated })
@@ -178,7 +179,7 @@ struct OneStep {
 }
 
 impl OneStep {
-    fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &Refit) -> Option<Self> {
+    fn new(engine: &Engine<'_>, linearisation: &Linearisation, model: &FittedModel) -> Option<Self> {
         let rig = rig_of(&engine.rig, &model.effects, &model.factors)?;
         let simulated = engine.simulate(&rig);
         let mut columns = linearisation.columns.clone();

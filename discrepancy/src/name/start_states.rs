@@ -1,7 +1,7 @@
 //! Refits of models of linked rods with the window start states re-estimated under the model itself.
 
 use crate::engine::Engine;
-use crate::refit::{EffectEstimate, Linearisation, Refit, linearise, loss_at, refit, rig_of};
+use crate::refit::{EffectEstimate, FittedModel, Linearisation, linearise, loss_at, refit, rig_of};
 use model_fit::parallel;
 
 /// Starting amplitudes of the backlash.
@@ -11,14 +11,14 @@ const MAX_ALTERNATIONS: usize = 3;
 const RELATIVE_TOLERANCE: f64 = 0.05;
 
 /// A fitted model, and the engine whose start states were estimated under it; `None` where the rods are not linked.
-pub(super) struct RefitWithInitialStates<'a> {
+pub(super) struct FitWithStartStates<'a> {
     pub(super) engine: Option<Engine<'a>>,
-    pub(super) fit: Refit,
+    pub(super) fit: FittedModel,
 }
 
 /// Refits a model of linked rods, alternating with estimates of the window start states under it.
-pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit) -> RefitWithInitialStates<'a> {
-    let mut best = RefitWithInitialStates { engine: None, fit: model.clone() };
+pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &FittedModel) -> FitWithStartStates<'a> {
+    let mut best = FitWithStartStates { engine: None, fit: model.clone() };
     for _ in 0..if engine.is_linked() { MAX_ALTERNATIONS } else { 0 } {
         let Some(rig) = rig_of(&engine.rig, &best.fit.effects, &best.fit.factors) else { break };
         let restarted = engine.with_starts_under(&rig);
@@ -28,7 +28,7 @@ pub(super) fn refit_with_starts<'a>(engine: &Engine<'a>, model: &Refit) -> Refit
         let converged =
             best.engine.is_some() && fit.loss > best.fit.loss - RELATIVE_TOLERANCE * best.fit.loss.abs();
         if best.engine.is_none() || fit.loss < best.fit.loss {
-            best = RefitWithInitialStates { engine: Some(restarted), fit };
+            best = FitWithStartStates { engine: Some(restarted), fit };
         }
         if converged {
             break;

@@ -84,7 +84,7 @@ impl Setting<'_> {
         // Of linked rods the search for start states takes most of the time: that of the first record serves all.
         let of_starts = |engine: &Engine<'_>| engine.windows.iter().map(Windows::sensitivities).collect();
         let of_starts: Vec<Vec<_>> = engines.iter().filter(|_| run.linked).map(of_starts).collect();
-        let mut fits: Vec<Refits> = Vec::new();
+        let mut fits: Vec<LinearisedFit> = Vec::new();
         let mut trials = vec![self.trial(&engines, truth, &mut fits)?];
         for number in 1..seeds.records {
             let record = record(number);
@@ -101,14 +101,14 @@ impl Setting<'_> {
         Some(Trials { trials, clearance_m })
     }
 
-    fn trial(&self, engines: &[Engine<'_>], truth: usize, fits: &mut Vec<Refits>) -> Option<Trial> {
+    fn trial(&self, engines: &[Engine<'_>], truth: usize, fits: &mut Vec<LinearisedFit>) -> Option<Trial> {
         let engine_of = |at: usize| engines.get(at).unwrap_or(&engines[0]);
         let rigs = self.explanations.iter().map(|explanation| &explanation.rig);
         let simulated: Vec<Vec<f64>> =
             rigs.enumerate().map(|(at, rig)| engine_of(at).simulate(rig)).collect();
         if fits.is_empty() {
             // Sensitivities hardly depend on the noise: those of the first record serve all.
-            let of = |at: usize| Refits::new(self, at, engine_of(at), &simulated[at]);
+            let of = |at: usize| LinearisedFit::new(self, at, engine_of(at), &simulated[at]);
             *fits = (0..self.explanations.len()).map(of).collect::<Option<_>>()?;
         }
         let mut losses = Vec::with_capacity(fits.len());
@@ -144,8 +144,8 @@ impl Setting<'_> {
         let rigs = self.explanations.iter().map(|explanation| &explanation.rig);
         let simulated: Vec<Vec<f64>> = rigs.map(|rig| training.simulate(rig)).collect();
         let all = 0..self.explanations.len();
-        let fits = all.clone().map(|at| Refits::new(self, at, training, &simulated[at]));
-        let fits: Vec<Refits> = fits.collect::<Option<_>>()?;
+        let fits = all.clone().map(|at| LinearisedFit::new(self, at, training, &simulated[at]));
+        let fits: Vec<LinearisedFit> = fits.collect::<Option<_>>()?;
         let of_truth = |truth: usize| -> Option<Vec<f64>> {
             let losses = fits.iter().zip(&simulated).map(|(fit, alternative)| {
                 fit.loss(training, &training.difference(&simulated[truth], alternative), Noise::Expected)
@@ -182,7 +182,7 @@ fn record_engines<'a>(
 }
 
 /// The linearised fit of an explanation.
-struct Refits {
+struct LinearisedFit {
     /// Sensitivities to the parameters, then to the numbers of the effects.
     columns: Vec<Vec<f64>>,
     precisions: Vec<f64>,
@@ -190,7 +190,7 @@ struct Refits {
     offsets: Vec<f64>,
 }
 
-impl Refits {
+impl LinearisedFit {
     fn new(setting: &Setting<'_>, at: usize, engine: &Engine<'_>, simulated: &[f64]) -> Option<Self> {
         let explanation = &setting.explanations[at];
         let rig = &explanation.rig;
@@ -206,7 +206,7 @@ impl Refits {
                 offsets.push(0.0);
             }
         }
-        Some(Refits { columns, precisions, offsets })
+        Some(LinearisedFit { columns, precisions, offsets })
     }
 
     /// The loss, and the design effect of the first number of its effects.

@@ -13,7 +13,7 @@ use crate::engine::{Engine, FACTOR_CHANGE};
 use crate::fit::loss;
 use crate::name::EFFECT_PARAMETER_PENALTY;
 use crate::parameters::{COUNT, PARAMETERS, with_factors};
-use crate::refit::{MOST_OFF, Refit, has_factor_at_bound};
+use crate::refit::{FittedModel, MOST_OFF, has_factor_at_bound};
 use crate::windows::{ReferenceRun, VariableRanges};
 use model_fit::estimator::{Convergence, Estimator, Options, Outcome, Step, TABLES, TABLES_WITHIN};
 use model_fit::parallel;
@@ -203,7 +203,11 @@ impl Iterate {
     }
 
     /// The parameters with standard errors, as a fit without effects; `linearisation` is the linearisation at the model.
-    pub(super) fn as_refit(&self, engine: &Engine<'_>, linearisation: &TableLinearisation) -> Refit {
+    pub(super) fn as_fitted_model(
+        &self,
+        engine: &Engine<'_>,
+        linearisation: &TableLinearisation,
+    ) -> FittedModel {
         let (coordinates, precisions) = (self.model.coordinates(), self.model.precisions());
         let mut errors = vec![f64::INFINITY; COUNT];
         let products = engine.products(&self.residual, &linearisation.columns);
@@ -217,7 +221,7 @@ impl Iterate {
             }
         }
         let factors = self.model.factors;
-        Refit {
+        FittedModel {
             effects: Vec::new(),
             factors,
             loss: self.loss,

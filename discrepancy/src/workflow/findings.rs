@@ -4,7 +4,7 @@ use crate::calibrate::quantity;
 use crate::engine::Engine;
 use crate::name::{SelectionResult, is_large, is_same_effect, share_removed, significantly_off};
 use crate::parameters::COUNT;
-use crate::refit::{EffectEstimate, Refit};
+use crate::refit::{EffectEstimate, FittedModel};
 use crate::report::{
     self, DetectionLimit, NamedEffect, Quantity, Report, SCHEMA_VERSION, Verdict, effect_place, place_of,
     strongest,
@@ -145,7 +145,7 @@ fn candidates(found: &SelectionResult) -> Vec<report::Candidate> {
             let effect = &screened.start;
             let candidate = &effect.candidate;
             let is_it = |other: &EffectEstimate| is_same_effect(other, effect);
-            let is_last = |fit: &&Refit| fit.effects.last().is_some_and(is_it);
+            let is_last = |fit: &&FittedModel| fit.effects.last().is_some_and(is_it);
             let alone = found.fitted.iter().filter(|fit| fit.effects.len() == 1).find(is_last);
             let of_model = found.model.effects.iter().position(is_it);
             let is_alike = found.alternatives.iter().flatten().any(|alternative| is_last(&&alternative.fit));

@@ -76,7 +76,7 @@ pub(super) fn scaled(coordinates: &[(HeavyTailed, f64)], factor: f64) -> Vec<(He
 mod tests {
     use super::*;
     use crate::parameters::COUNT;
-    use crate::refit::{EffectEstimate, Refit};
+    use crate::refit::{EffectEstimate, FittedModel};
     use plant::RigParameters;
 
     const KINDS: [ExplanationKind; 5] = [
@@ -95,7 +95,7 @@ mod tests {
                 candidate: *candidate,
                 coordinates: candidate.origin(),
             };
-            let fit = Refit {
+            let fit = FittedModel {
                 effects: all[..effects].iter().map(effect).collect(),
                 factors: [1.0; COUNT],
                 loss: 0.0,

@@ -23,7 +23,7 @@ struct Case<'a> {
     engine: Engine<'a>,
     linearisation: Linearisation,
     columns: Columns,
-    calibrated: Refit,
+    calibrated: FittedModel,
 }
 
 impl<'a> Case<'a> {
@@ -37,7 +37,7 @@ impl<'a> Case<'a> {
     }
 
     /// The best candidate of the screening, or the one of a name, refitted.
-    fn fitted(&self, name: Option<&str>) -> Refit {
+    fn fitted(&self, name: Option<&str>) -> FittedModel {
         let residual = self.engine.residual(&self.engine.simulate(&self.engine.rig));
         let (_, mut screened) = self.columns.screen(&self.engine, &self.linearisation, &residual, &[]);
         screened.sort_by(|left, right| left.loss.total_cmp(&right.loss));
@@ -46,7 +46,7 @@ impl<'a> Case<'a> {
         refit(&self.engine, &self.linearisation, &[best.start]).unwrap()
     }
 
-    fn significance(&self, model: &Refit, explanations: &[Explanation]) -> Significance {
+    fn significance(&self, model: &FittedModel, explanations: &[Explanation]) -> Significance {
         let Case { engine, linearisation, columns, calibrated } = self;
         let fitted = Fitted { engine, linearisation, columns, calibrated, explanations, threshold: 0.0 };
         fitted.significance(model).unwrap()
