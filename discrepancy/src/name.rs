@@ -13,6 +13,8 @@
 //! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
 //! What is to be named has to gain more than chance gives, its best windows aside (`name/significance.rs`).
 //!
+//! The loss of a fit is the penalised loss J here (`FittedModel::loss`), that of windows the loss L (`fit.rs`).
+//!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
 mod decision;
@@ -60,8 +62,8 @@ use start_states::{FitWithStartStates, refit_with_starts};
 const MAX_EFFECTS: usize = 3;
 /// Gauss-Newton steps of a candidate's first fit.
 const STEPS: usize = 5;
-/// Loss J over the degrees of freedom of all windows above which a model shows lack of fit (is inadequate): an engineer's
-/// tolerance, many standard errors wide, and no test.
+/// Penalised loss J over the degrees of freedom of all windows above which a model shows lack of fit (is inadequate): an
+/// engineer's tolerance, many standard errors wide, and no test.
 const LACK_OF_FIT_PER_DOF: f64 = 0.08;
 /// The same for linked rods, where micrometres decide when the rod end meets the carriage: the true model leaves up to 0.2.
 const LACK_OF_FIT_PER_DOF_LINKED: f64 = 0.3;
@@ -335,7 +337,7 @@ fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &FittedModel) -> bool {
     engine.axis_by_axis && (lacks_on([true, false]) || lacks_on([false, true]))
 }
 
-/// Loss J over the degrees of freedom of all windows above which a model leaves more than noise.
+/// Penalised loss J over the degrees of freedom of all windows above which a model leaves more than noise.
 pub(crate) fn lack_of_fit_per_dof(linked: bool) -> f64 {
     if linked { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF }
 }
@@ -377,8 +379,8 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
 
 /// Detection limits, in Currie's terms (1968) decision limits: the amplitude whose expected linear gain reaches
 /// [`THRESHOLD_FACTOR_SINGLE`] null thresholds and the gain worth a fit, at least the floor. The linear gain exceeds that in half
-/// of the records; the procedure finds fewer, since the objective charges [`EFFECT_PARAMETER_PENALTY`] for each parameter of the
-/// effect. The smallest limit of several probes is optimistic for nonlinear effects.
+/// of the records; the procedure finds fewer, since J has [`EFFECT_PARAMETER_PENALTY`] for each parameter of the effect.
+/// The smallest limit of several probes is optimistic for nonlinear effects.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
     let limits =
         null.limits(columns.candidates.len(), (THRESHOLD_FACTOR_SINGLE * threshold).max(MIN_LOSS_REDUCTION));

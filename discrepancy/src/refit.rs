@@ -46,8 +46,8 @@ pub struct FittedModel {
     pub effects: Vec<EffectEstimate>,
     /// Factors of the baseline parameters, in the order of [`PARAMETERS`]; 1 is the rig file's value.
     pub factors: [f64; COUNT],
-    /// The loss with priors and, of fits that are compared, a penalty for each number of an effect and each parameter that is
-    /// off; a reported model (`name::gauss_newton::fit_selected`) has no penalties in it.
+    /// The penalised loss J of fits that are compared: loss L of the windows, priors, and a penalty for each number of an effect
+    /// and each parameter that is off. Of a reported model (`name::gauss_newton::fit_selected`) L and priors alone.
     pub loss: f64,
     /// Squared residuals of each window.
     pub(crate) squares: Vec<f64>,
@@ -201,9 +201,9 @@ impl Iterate for ProjectedFit {
     }
 }
 
-/// Fits effects from a start.
+/// Fits effects from a starting point.
 ///
-/// `None` where no rig can have the start.
+/// `None` where no rig can have it.
 pub(crate) fn refit(
     engine: &Engine<'_>,
     linearisation: &Linearisation,
@@ -212,7 +212,7 @@ pub(crate) fn refit(
     refit_steps(engine, linearisation, start, CANDIDATE.steps)
 }
 
-/// The same with another maximum of steps; 0 evaluates the start.
+/// The same with another maximum of steps; 0 evaluates the starting point.
 pub(crate) fn refit_steps(
     engine: &Engine<'_>,
     linearisation: &Linearisation,

@@ -41,7 +41,7 @@ const MAX_KNOTS: usize = tabulated::POINTS[1];
 /// Steps of a first fit, and of a final one.
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
-/// Share of the loss that a table must remove, and a second one of the remaining loss.
+/// Share of the penalised loss that a table must remove, and a second one of what remains of it.
 const LEAST_SHARE: f64 = 0.05;
 const LEAST_SHARE_OF_SECOND: f64 = 0.15;
 

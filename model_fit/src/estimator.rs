@@ -71,7 +71,7 @@ pub const CALIBRATION: Options = Options { steps: 7, ..RELINEARISATION };
 
 /// A model simulated at one set of its numbers.
 pub trait Iterate {
-    /// Loss of the windows with priors and penalties.
+    /// What the fit minimises: the loss with priors, of some fits with penalties.
     fn loss(&self) -> f64;
     /// Whether a number is at the end of its range.
     fn is_at_bound(&self) -> bool;
@@ -137,7 +137,7 @@ impl Estimator {
         self.evaluations += within.evaluations;
     }
 
-    /// Steps from a start until convergence.
+    /// Steps from a starting point until convergence.
     pub fn descend<P: Iterate>(
         mut self,
         start: P,

@@ -70,7 +70,7 @@ pub(crate) struct Fitting<'a> {
     pub(crate) unknowns: Vec<Unknown>,
     /// Rows of each record that count.
     in_score: Vec<std::ops::Range<usize>>,
-    /// Values of what is not fitted: parameters of each record, and starts.
+    /// Values of what is not fitted: parameters of each record, and starts of its states.
     parameters_si: Vec<Vec<f64>>,
     starts_si: Vec<Vec<f64>>,
     memories_si: Vec<f64>,
@@ -426,7 +426,7 @@ impl<'a> Fitting<'a> {
         Fitting { most_steps: self.most_steps.min(most_steps), ..self.clone() }
     }
 
-    /// Fits from a start within the ranges in at most so many steps.
+    /// Fits from a starting point within the ranges in at most so many steps.
     pub(crate) fn fit(&self, start: Vec<f64>, steps: usize) -> Result<(Point, Convergence), Failure> {
         let start = self.at(start)?;
         let here = self.near(&start);

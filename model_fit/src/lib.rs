@@ -20,7 +20,7 @@
 //! | `covariance` | standard errors with autocorrelated residuals and an approximate law |
 //! | `cuts` | rows in blocks of time, and in bands |
 //! | `folds` | leave-one-block-out cross-validation |
-//! | `starts` | from where a fit starts |
+//! | `starts` | starting points of a fit |
 //! | `select` | which suspects are taken |
 //! | `judge` | whether a suspect passes |
 //! | `pairs` | two suspects that pay together where neither does alone |

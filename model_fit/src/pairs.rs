@@ -21,7 +21,7 @@ use super::structure::{self, LinearisedFit};
 use crate::parallel;
 use nalgebra::DVector;
 
-/// Pairs that are fitted in the simulator, and points of each from which that starts.
+/// Pairs that are fitted in the simulator, and starting points of each.
 pub(super) const FITTED: usize = 4;
 const POINTS: usize = 3;
 /// Most steps of its fit: two suspects that hardly differ make a valley without an end, and such a pair does not pass.

@@ -1,7 +1,7 @@
 //! Which suspects are taken, by forward selection on the training records alone.
 //!
-//! A suspect is fitted together with everything that the model leaves open, in the simulator, from several starts ([`starts`]).
-//! The gates stand in [`super::judge`].
+//! A suspect is fitted together with everything that the model leaves open, in the simulator, from several starting points
+//! ([`starts`]). The gates stand in [`super::judge`].
 //!
 //! A fold is judged by the fit without it, which follows from the normal equations of the others by one linear step. The best of
 //! what passes is taken; another that passes and is not better or worse beyond doubt explains the records as well.
@@ -277,7 +277,7 @@ pub(crate) fn fitted<'a>(
     fitted_from(model, records, suspects, (starts, OPTIONS.steps))
 }
 
-/// The same from given starts, in at most so many steps.
+/// The same from given starting points, in at most so many steps.
 pub(crate) fn fitted_from<'a>(
     model: &'a Model,
     records: &'a [MeasuredRecord],

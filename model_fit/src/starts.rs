@@ -1,11 +1,11 @@
-//! From where a fit starts: an output error has many minima, and the lowest that several starts lead to is taken.
+//! Starting points of a fit: an output error has many minima, and the lowest that several points lead to is taken.
 //!
-//! | starts | how many |
+//! | starting points | how many |
 //! |---|---|
 //! | values of the file, those of the smaller fit, each value of the newest suspect | at most 12 |
 //! | numbers of the newest suspect over their ranges, all others as in the smaller fit | 4 to 24, by the length of the records |
 //! | the newest suspect without effect: a number at 0 or at an end of its range that leaves what the smaller does | at most 1 |
-//! | points of a Halton sequence around them, those with the least loss | `kept` of `[fit] starts` |
+//! | points of a Halton sequence around them, those with the least loss | three of `[fit] starts` |
 //!
 //! A point is spread over a fifth to five times each number, as far as its range allows; a number that may change its sign over
 //! five times it either way, and one whose value is 0 over its range. A suspect's own number goes over its whole range, on a
@@ -13,7 +13,7 @@
 //! alone say which of its points are kept.
 //!
 //! Of the first two rows six go on beside the first value: those with the largest fall of the squares, were what the suspect does
-//! there taken times the best share. All starts go two steps, the best six four more, and the best two of these to the end
+//! there taken times the best share. All points go two steps, the best six four more, and the best two of these to the end
 //! [Jamieson, Talwalkar 2016, AISTATS: successive halving].
 //!
 //! Source: Halton 1960, Numerische Mathematik 2 (bases are the primes).
@@ -24,12 +24,12 @@ use crate::structure::LinearisedFit;
 use model::Failure;
 use nalgebra::DVector;
 
-/// Most starts that values of the file make.
+/// Most starting points that values of the file make.
 const MOST: usize = 12;
 /// Rows over the points of a suspect's own numbers, and the fewest and most of these: a fit takes some seconds on any record.
 const ROWS_TIMES_POINTS: usize = 14_400;
 const POINTS: [usize; 2] = [4, 24];
-/// Of a suspect's values and points those that are fitted beside the first, and the cosine of what two do that are one start.
+/// Of a suspect's values and points those that are fitted beside the first, and the cosine of what two do that are one point.
 const PROMISING: usize = 6;
 const SAME_DIRECTION: f64 = 0.999;
 /// Points of the sequence that are kept.
@@ -43,7 +43,7 @@ const BELOW: f64 = 20.0;
 /// Bases of the sequence; numbers beyond them keep their values.
 const PRIMES: [u32; 20] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61, 67, 71];
 
-/// Starts of a fit beside what a smaller model came to.
+/// Starting points of a fit beside what a smaller model came to.
 pub(crate) fn starts(
     fitting: &Fitting<'_>,
     suspects: &[usize],
@@ -92,8 +92,8 @@ fn of_newest_from(fitting: &Fitting<'_>, suspects: &[usize], first: &[f64]) -> V
     all
 }
 
-/// Of starts that differ in the suspect's own numbers the first, and those with the largest fall of the squares by a share of
-/// what the suspect does there.
+/// Of starting points that differ in the suspect's own numbers the first, and those with the largest fall of the squares by a
+/// share of what the suspect does there.
 fn promising(
     fitting: &Fitting<'_>,
     starts: Vec<Vec<f64>>,
@@ -123,7 +123,8 @@ fn promising(
 }
 
 impl Fitting<'_> {
-    /// The best of the fits from several starts: a few steps from each, and at most so many from those that have come lowest.
+    /// The best of the fits from several starting points: a few steps from each, and at most so many from those that have come
+    /// lowest.
     pub(crate) fn fit_from(
         &self,
         starts: Vec<Vec<f64>>,
@@ -150,7 +151,7 @@ impl Fitting<'_> {
         };
         for (round, (_, kept)) in ROUNDS.iter().enumerate() {
             begun.sort_by(|(one, _), (other, _)| one.loss.total_cmp(&other.loss));
-            // Starts that have come to the same minimum go on once.
+            // Points that have come to the same minimum go on once.
             begun.dedup_by(|(one, _), (other, _)| one.loss - other.loss < OPTIONS.absolute_tolerance);
             begun.truncate(*kept);
             let steps = ROUNDS.get(round + 1).map_or(most, |(steps, _)| *steps);
@@ -160,7 +161,7 @@ impl Fitting<'_> {
         best.ok_or_else(|| why.expect("there is one start at least"))
     }
 
-    /// Starts within the ranges, each once.
+    /// Starting points within the ranges, each once.
     fn within_ranges(&self, starts: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
         let mut all: Vec<Vec<f64>> = Vec::new();
         for mut start in starts {
@@ -214,7 +215,7 @@ fn within_range(value: f64, [least, most]: [f64; 2], share: f64) -> f64 {
     if least > 0.0 { least * libm::pow(most / least, share) } else { most * share }
 }
 
-/// A start that leaves what the smaller fit leaves: a larger model must not end above it.
+/// A starting point that leaves what the smaller fit leaves: a larger model must not end above it.
 fn without_effect(fitting: &Fitting<'_>, suspect: usize, first: &[f64], loss: f64) -> Option<Vec<f64>> {
     let candidates = places_of(fitting, suspect).into_iter().flat_map(|place| {
         let [least, most] = fitting.unknowns[place].range_si;
@@ -233,7 +234,7 @@ fn without_effect(fitting: &Fitting<'_>, suspect: usize, first: &[f64], loss: f6
     candidates.into_iter().find(is_as_low)
 }
 
-/// Every start of the newest suspect beside the other numbers.
+/// Every value of the newest suspect in the file beside the other numbers.
 fn values_of_newest(fitting: &Fitting<'_>, suspects: &[usize], first: Vec<f64>) -> Vec<Vec<f64>> {
     let mut all = vec![first];
     let Some(newest) = suspects.last() else { return all };

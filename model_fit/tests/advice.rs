@@ -101,7 +101,7 @@ fn a_sensor_is_advised_that_shows_a_suspect_which_hides() {
 
 #[test]
 fn a_sensor_is_advised_of_a_state_that_changes_no_output() {
-    // Its rate is fitted from several starts, of which the record prefers none.
+    // Its rate is fitted from several starting points, of which the record prefers none.
     let third = "[parameters]\nrate = { unit = \"1/s\", value = 0.5 }\n[states.third]\nunit = \"m\"\nstart = 0\n\
                  derivative = \"rate*(lower - third)\"\n[define]";
     let leak = "[[suspects]]\nname = \"leak\"\nplace = \"third\"\nadd = \"-k*third\"\n\

@@ -1,4 +1,4 @@
-//! Suspects that pay together where neither does alone, and fits that need several starts to find what a suspect does.
+//! Suspects that pay together where neither does alone, and fits that need several starting points to find what a suspect does.
 
 use crate::closing::{self, named, number, random};
 use model_fit::{ModelReport, Search, Verdict};

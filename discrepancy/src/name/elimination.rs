@@ -9,7 +9,7 @@ use model_fit::parallel;
 
 /// Runners-up of an earlier round that are tried again after another effect joined.
 const SWAPPED: usize = 3;
-/// Fits are indistinguishable when their objectives differ by less than this times the design effect. Noise alone makes the wrong
+/// Fits are indistinguishable when their J differ by less than this times the design effect. Noise alone makes the wrong
 /// one of two better by more in one record of 700 at most, if both have the same number of effect parameters; each further
 /// parameter shifts the difference by [`super::EFFECT_PARAMETER_PENALTY`].
 pub(crate) const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;

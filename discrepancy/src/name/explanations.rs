@@ -8,8 +8,8 @@
 //!
 //! A set has the effects that are large enough to be named; fits that differ in smaller ones beside them are the same
 //! explanation, and its features are those of the best of them. Sets are alike when they differ in one effect, and the responses
-//! to the two have a cosine above [`ALIKE_COSINE`], parameters projected out. Losses are J of `refit`: minus twice the
-//! log-likelihood of the windows, priors and penalties included.
+//! to the two have a cosine above [`ALIKE_COSINE`], parameters projected out. Losses are J, the penalised loss of a fit:
+//! minus twice the log-likelihood of the windows, priors and penalties included.
 
 use super::probabilities::probabilities;
 use super::{

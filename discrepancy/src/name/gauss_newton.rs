@@ -43,8 +43,8 @@ pub(super) fn shrink_parameters(engine: &Engine<'_>, model: &FittedModel) -> [f6
     tried[best.expect("one at least")]
 }
 
-/// Fits all parameters and coordinates of a model in the simulator, penalties included; returns the model itself where the loss
-/// does not fall.
+/// Fits all parameters and coordinates of a model in the simulator, and adds the penalties; returns the model itself where the
+/// penalised loss does not fall.
 pub(super) fn fit_all(engine: &Engine<'_>, model: &FittedModel) -> FittedModel {
     let Some(mut fit) = fit_for_comparison(engine, model) else { return model.clone() };
     fit.loss += model_penalty(coordinates(&fit.effects), &fit.factors);
@@ -58,7 +58,7 @@ struct SimulatedModel {
     residual: Vec<f64>,
     /// Squared residuals of each window.
     squares: Vec<f64>,
-    /// Loss of the windows and of the priors.
+    /// Loss of the windows with priors, without penalties.
     loss: f64,
 }
 

@@ -11,10 +11,10 @@
 //! with a term of any size. Sensitivities to the parameters are those of parameters alone for all explanations, so that the term
 //! is orthogonal to the same in each.
 //!
-//! Amplitudes have half-Cauchy priors whose median is the middle of the range that the sheet draws from. The leading amplitude of
-//! an effect that lies near a bound, or along which the simulated loss is no parabola, is integrated by Gauss and Legendre's rule
-//! through the simulator, the other numbers refitted linearly at each node, one amplitude of an explanation at most; all others
-//! by Laplace.
+//! Amplitudes have Cauchy priors, half-Cauchy where they have one sign; the median of their size is the middle of the range that
+//! the sheet draws from. The leading amplitude of an effect that lies near a bound, or along which the simulated loss is no
+//! parabola, is integrated by Gauss and Legendre's rule through the simulator, the other numbers refitted linearly at each node,
+//! one amplitude of an explanation at most; all others by Laplace.
 //!
 //! Of linked rods there are none: each model has start states of its own there, and thus another residual.
 //!

@@ -177,7 +177,7 @@ impl Model {
 pub(super) struct Iterate {
     pub(super) model: Model,
     residual: Vec<f64>,
-    /// Loss of the windows plus penalties.
+    /// Penalised loss: of the windows, with priors and the penalty for the points.
     pub(super) loss: f64,
 }
 
@@ -303,7 +303,7 @@ impl TableLinearisation {
         })
     }
 
-    /// Cross-validated loss of the linearised model, without penalties.
+    /// Cross-validated loss of the linearised model, without priors and penalties.
     pub(super) fn cross_validated_loss(&self, engine: &Engine<'_>, point: &Iterate) -> f64 {
         let products = engine.products(&point.residual, &self.columns);
         let coordinates = self.model.coordinates();
@@ -312,7 +312,7 @@ impl TableLinearisation {
         products.cross_validated_loss(&(0..coordinates.len()).collect::<Vec<_>>(), &precisions, &from, FOLDS)
     }
 
-    /// Predicted loss of the linearised model with further tables.
+    /// Predicted penalised loss of the linearised model with further tables.
     pub(super) fn predicted_loss(
         &self,
         engine: &Engine<'_>,
