@@ -401,10 +401,8 @@ impl Laws for Effects {
         let bristle_load = friction.bristle_load(start.velocity, speed, force);
         let (way_m, bristle) = effect.advance(bristle, bristle_load, span_s);
         axis_states.deflection_m = bristle.deflection_m;
-        of.motion.stop_at_ends(PistonState {
-            extension: start.extension + way_m,
-            velocity: bristle.velocity_m_per_s,
-        })
+        let extension = start.extension + way_m;
+        of.motion.stop_at_ends(PistonState { extension, velocity: bristle.velocity_m_per_s })
     }
 
     fn air(&self, step: StepContext<'_>, to: &mut Lanes, middle: &MidpointAir, states: &mut EffectStates) {
