@@ -104,7 +104,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let writer = match checked.and_then(|()| open_folder(arguments, &inputs, &started, console.clone())) {
         Ok(writer) => writer,
         Err(error) => {
-            drop(host);
+            host.and_then(stop_host);
             return Err(error);
         }
     };

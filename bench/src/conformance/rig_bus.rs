@@ -143,7 +143,7 @@ impl RigBus {
 impl Drop for RigBus {
     fn drop(&mut self) {
         // Its counters are not needed.
-        if let Some(Err(error)) = self.host.take().map(HostThread::stop) {
+        if let Some(Ok(Err(error))) = self.host.take().map(HostThread::join) {
             eprintln!("bench: the bus host failed: {error}");
         }
     }

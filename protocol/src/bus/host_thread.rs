@@ -30,12 +30,19 @@ impl HostThread {
     ///
     /// # Errors
     /// The reason why the host ended by itself: epoll or the wire's timer failed.
-    pub fn stop(mut self) -> io::Result<HostReport> {
-        let joined = self.join().expect("joined here alone");
-        joined.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+    pub fn stop(self) -> io::Result<HostReport> {
+        self.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
     }
 
-    fn join(&mut self) -> Option<std::thread::Result<io::Result<HostReport>>> {
+    /// As [`stop`](Self::stop), but returns a panic of the thread: a destructor must not panic.
+    ///
+    /// # Errors
+    /// What the thread panicked with.
+    pub fn join(mut self) -> std::thread::Result<io::Result<HostReport>> {
+        self.end().expect("joined here alone")
+    }
+
+    fn end(&mut self) -> Option<std::thread::Result<io::Result<HostReport>>> {
         self.stop.store(true, Ordering::Relaxed);
         self.thread.take().map(JoinHandle::join)
     }
@@ -44,6 +51,6 @@ impl HostThread {
 impl Drop for HostThread {
     fn drop(&mut self) {
         // Whoever wants its result stops it.
-        let _ = self.join();
+        let _ = self.end();
     }
 }
