@@ -64,5 +64,8 @@ pub fn with_command_line(text: &str) -> impl Iterator<Item = (PathBuf, String)> 
 
 fn folders() -> impl Iterator<Item = PathBuf> {
     let entries = fs::read_dir("/proc").expect("the kernel's list of processes").flatten();
-    entries.map(|entry| entry.path()).filter(|path| path.join("stat").exists())
+    // `/proc/self` and the like name processes a second time.
+    let is_number =
+        |entry: &fs::DirEntry| entry.file_name().to_str().is_some_and(|name| name.parse::<u32>().is_ok());
+    entries.filter(is_number).map(|entry| entry.path())
 }
