@@ -18,8 +18,10 @@ pub const REMOTE_FLAG: u32 = 0x4000_0000;
 pub const ERROR_FLAG: u32 = 0x2000_0000;
 /// Bits of an 11-bit identifier.
 pub const STANDARD_MASK: u32 = 0x7FF;
-/// Bits of a 29-bit identifier, and of an error frame's class.
+/// Bits of a 29-bit identifier.
 pub const EXTENDED_MASK: u32 = 0x1FFF_FFFF;
+/// Bits of an error frame's class.
+pub const ERROR_MASK: u32 = EXTENDED_MASK;
 
 /// A classic CAN frame: identifier with the kernel's flags, and 0 to 8 bytes of data.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -10,7 +10,7 @@
 //! `can_rcv_filter`).
 
 use crate::abi::{INVERTED_FLAG, u32_at};
-use protocol::can::{ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK, REMOTE_FLAG, STANDARD_MASK};
+use protocol::can::{ERROR_FLAG, ERROR_MASK, EXTENDED_FLAG, REMOTE_FLAG, STANDARD_MASK};
 use rustix::io::Errno;
 
 /// Options of `SOL_CAN_RAW`.
@@ -37,7 +37,7 @@ impl Filter {
     fn is_passed_by(self, id: u32) -> bool {
         let mut mask = self.mask;
         if mask & ERROR_FLAG != 0 {
-            return id & ERROR_FLAG != 0 && id & mask & EXTENDED_MASK != 0;
+            return id & ERROR_FLAG != 0 && id & mask & ERROR_MASK != 0;
         }
         if id & ERROR_FLAG != 0 {
             return false;
@@ -117,7 +117,7 @@ impl RawOptions {
         if option == XL_FRAMES && number != 0 {
             self.numbers[FD_FRAMES as usize] = number;
         }
-        self.numbers[option as usize] = if option == ERROR_FILTER { number & EXTENDED_MASK } else { number };
+        self.numbers[option as usize] = if option == ERROR_FILTER { number & ERROR_MASK } else { number };
         Ok(())
     }
 

@@ -8,7 +8,7 @@
 //!
 //! An error frame is a report of an interface to its host; it cannot be sent.
 
-use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK};
+use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG, EXTENDED_MASK, STANDARD_MASK};
 use protocol::frames::MessageSpec;
 use std::str::FromStr;
 
@@ -73,8 +73,8 @@ impl FromStr for Exclusion {
         match (text, text.len(), number) {
             ("commands", _, _) => Ok(Self::Commands),
             ("rig", _, _) => Ok(Self::Rig),
-            (_, 3, Some(id)) if id < 0x800 => Ok(Self::Identifier(id)),
-            (_, 8, Some(id)) if id < 0x2000_0000 => Ok(Self::Identifier(id | EXTENDED_FLAG)),
+            (_, 3, Some(id)) if id <= STANDARD_MASK => Ok(Self::Identifier(id)),
+            (_, 8, Some(id)) if id <= EXTENDED_MASK => Ok(Self::Identifier(id | EXTENDED_FLAG)),
             _ => Err(InvalidExclusion(text.into())),
         }
     }
