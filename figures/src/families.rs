@@ -43,7 +43,7 @@ pub(crate) enum Worst {
     Farthest,
     /// The latest; none as soon as one repetition lacks it, since there it never came about.
     Latest,
-    /// None: it is measured over the whole run.
+    /// None: it is measured over the whole run. All definitions of its family are of this kind.
     Run,
 }
 
@@ -192,6 +192,15 @@ mod tests {
             assert_eq!(unit_of(name).unwrap_or("1"), *unit, "{name}");
             assert_eq!(*name, name.to_lowercase());
             assert!(!meaning.is_empty() && list().contains(name));
+        }
+    }
+
+    /// Of a mixed family a `Run` figure would be the largest of the repetitions.
+    #[test]
+    fn a_family_is_of_the_whole_run_or_of_the_repetitions() {
+        for Family { title, definitions, .. } in FAMILIES {
+            let of_run = definitions.iter().filter(|known| known.worst == Worst::Run).count();
+            assert!([0, definitions.len()].contains(&of_run), "{title}");
         }
     }
 
