@@ -6,6 +6,7 @@
 //! | [`guard`] | the watch over every algorithm: finite results, in time |
 //! | [`linearisation`] | from a velocity to a valve opening |
 //! | [`rest_zone`] | when a rod is left alone |
+//! | `laws` | what every algorithm must keep; in tests alone |
 //! | the others | one algorithm each |
 
 #![warn(missing_docs)] // an interface of other crates

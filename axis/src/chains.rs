@@ -37,7 +37,7 @@ use protocol::periods::CYCLE_S;
 /// count: when the rig skips cycles, or this process is held up, the partner is not to blame.
 pub(crate) const PARTNER_LOST_CYCLES: u64 = 100;
 
-/// What was received of the other axis's controller.
+/// What was received from the other axis's controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Partner {
     pub(crate) status: Option<ChainStatus>,

@@ -32,7 +32,7 @@
 //! every_cycles = 1
 //! ```
 //!
-//! `[rig]` is the emulator's and `[passed]` the report's; they may hold what they like.
+//! `[rig]` is read and checked by `plant/src/scene/file.rs`, `[passed]` by `figures/src/thresholds.rs`; here they pass through.
 
 mod axis;
 

@@ -100,7 +100,8 @@ pub fn decode(text: &str, deserializer: &mut Deserializer) -> Result<Histogram<u
 /// Writes intervals, in the order given, as a log with this base time in s since 1970.
 ///
 /// # Errors
-/// What `out` says; [`io::ErrorKind::InvalidInput`] for a tag or a time that a log cannot hold.
+/// What `out` says; [`io::ErrorKind::InvalidInput`] for a time that a log cannot hold, before anything is written, and for such a
+/// tag, after the lines before it.
 pub fn write<'a>(
     out: &mut impl Write,
     base_unix_s: f64,

@@ -15,7 +15,7 @@
 //! being linked and in contact), then checks; if one does, it is discarded and made again in eight parts that locate it
 //! ([`Integrator::in_parts`]). So corners cost time only where they are.
 //!
-//! Why this scheme and this step: `docs/integration.md` has the measured table of error and cost for this and
+//! Why this scheme and this step: `plant/docs/integration.md` has the measured table of error and cost for this and
 //! other schemes; `cargo run --release -p plant --example accuracy` makes it.
 
 mod form;

@@ -44,7 +44,7 @@ pub enum Change {
     Fresh,
     /// Two senders use the identifier: valve shut.
     TwoSources,
-    /// One of the two has been silent: its commands act again.
+    /// One of the two has fallen silent: the commands of the other act again.
     OneSource,
 }
 

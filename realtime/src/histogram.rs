@@ -185,7 +185,7 @@ pub fn write_hlog(
 /// was. The base time is in seconds since 1970.
 ///
 /// # Errors
-/// As [`write_hlog`].
+/// As [`write_hlog`]; the lines before one with a bad tag are written.
 pub fn write_intervals<'a>(
     out: &mut impl Write,
     base_unix_s: f64,

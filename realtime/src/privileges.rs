@@ -64,7 +64,7 @@ impl Request {
         }
     }
 
-    /// What a thread wants that serves a loop: a bus host, an answering thread.
+    /// What a thread asks for that answers others: a bus host, an answering thread.
     #[must_use]
     pub fn for_a_server(fifo_priority: Option<u8>) -> Self {
         Self { fifo_priority, timer_slack: true, ..Self::default() }

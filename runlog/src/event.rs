@@ -79,7 +79,7 @@ pub enum EventKind<M = FaultMark> {
         /// Force on the load eye in +x, N.
         load_eye_n: f64,
     },
-    /// The first frame with this identifier that is not as `rig.dbc` says.
+    /// The first frame of the run that is not as `rig.dbc` says.
     #[error(
         "a frame with identifier {raw_id:#05x} is not as rig.dbc says and was ignored; more are counted silently"
     )]
@@ -87,7 +87,7 @@ pub enum EventKind<M = FaultMark> {
         /// Identifier with the kernel's flags.
         raw_id: u32,
     },
-    /// The first frame with this identifier, which only the rig sends, from elsewhere.
+    /// The first frame of the run from elsewhere that only the rig sends.
     #[error("frame {id:#05x} came from elsewhere: another rig is on this bus; stop one of them")]
     SecondRig {
         /// Identifier of the frame.

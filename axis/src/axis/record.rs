@@ -19,7 +19,7 @@ pub struct Answer {
     pub command: ValveCommand,
     /// The axis's own emergency stop, when it is due.
     pub emergency_stop: Option<EmergencyStop>,
-    /// States of the chains, every ten cycles and when one changes.
+    /// States of the chains, every ten cycles and when the status is another.
     pub status: Option<ChainStatus>,
     /// Averaged position, set-points and control error, every ten cycles and with a status that changed.
     pub values: Option<ChainValues>,

@@ -33,7 +33,8 @@ use std::path::{Path, PathBuf};
 pub struct AxisExperiment {
     /// Program that controls the axis, unless the command line names another.
     pub program: ProgramReference,
-    /// Where initial positioning goes and the row begins, m, rig coordinates; not used with a row of forces.
+    /// Where initial positioning goes and the row begins, m, rig coordinates; not used with a row of
+    /// forces, where alone it may be `None`.
     pub start_m: Option<f64>,
     /// Steps of the preparation after initial positioning, in this order.
     pub(crate) prepare: Vec<Prepare>,

@@ -39,6 +39,7 @@ pub(crate) enum Places {
     Linkage,
     /// All frames, or those of one identifier by its name in `rig.dbc`.
     Frames,
+    /// Frames with a counter (`alive`): sensors and valve commands.
     Counted,
     Bus,
     Node,
