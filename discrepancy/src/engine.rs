@@ -1,7 +1,7 @@
 //! The training records with the simulations of them.
 //!
 //! ```text
-//!   e      = readings - baseline                     what the baseline leaves
+//!   e      = readings - baseline                     residual of the baseline
 //!   N      = (with a factor 1 + h - with 1 - h) / 2 h, for each parameter that may be wrong
 //!   C_j    = effect j at a probe - baseline
 //! ```

@@ -10,7 +10,7 @@
 //!
 //! The text is edited at the spans that the parser gives, so that comments, order, blanks and line ends of the rest stay as they
 //! are. Old values stay as comments. New numbers are written in full, so that the emulator computes with the bits that were
-//! verified; their comments are rounded to what the standard error leaves of them.
+//! verified; their comments are rounded by the standard error.
 //!
 //! What a `parameter:` name scales is what the records of the study scale [tests/record-maker/src/numbers.rs].
 

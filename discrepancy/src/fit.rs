@@ -407,11 +407,11 @@ mod tests {
             let precisions = vec![1e-6; columns.len()];
             let products = Products::new(&residual, columns, &[50.0; 10], 50);
             let fit = products.fit(&all, &precisions);
-            let mut left = residual.clone();
+            let mut after = residual.clone();
             for (column, coefficient) in columns.iter().zip(&fit.coefficients) {
-                left.iter_mut().zip(*column).for_each(|(left, part)| *left -= coefficient * part);
+                after.iter_mut().zip(*column).for_each(|(value, part)| *value -= coefficient * part);
             }
-            let products = Products::new(&left, columns, &[50.0; 10], 50);
+            let products = Products::new(&after, columns, &[50.0; 10], 50);
             (fit.loss, products.cross_validated_loss(&all, &precisions, &fit.coefficients, 5))
         };
         let null = loss(&[]).1;

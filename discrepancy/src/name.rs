@@ -8,7 +8,7 @@
 //! ```
 //!
 //! An effect joins when it removes a given share of the remaining loss with an amplitude above a floor. It stays when removing it
-//! from the whole model raises the loss by a multiple of the null threshold. Where a model leaves more than noise, an effect
+//! from the whole model raises the loss by a multiple of the null threshold. Where a model lacks fit, an effect
 //! joins and stays when its amplitude is homogeneous over windows (`name/heterogeneity.rs`), small ones too. Probabilities of
 //! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
 //! What is to be named has to gain more than chance gives, its best windows aside (`name/significance.rs`).
@@ -65,7 +65,7 @@ const STEPS: usize = 5;
 /// Penalised loss J over the degrees of freedom of all windows above which a model shows lack of fit (is inadequate): an
 /// engineer's tolerance, many standard errors wide, and no test.
 const LACK_OF_FIT_PER_DOF: f64 = 0.08;
-/// The same for linked rods, where micrometres decide when the rod end meets the carriage: the true model leaves up to 0.2.
+/// The same for linked rods, where micrometres decide when the rod end meets the carriage: the true model has up to 0.2.
 const LACK_OF_FIT_PER_DOF_LINKED: f64 = 0.3;
 /// Screened gain that the best candidate must have for a round to be fitted; also the least gain of an effect that joins, of a
 /// homogeneous one, and that of a detection limit. An empirical value, about twice what chance gives: of forty independent null
@@ -116,7 +116,7 @@ pub struct SelectionResult {
     pub(crate) calibrated_loss: f64,
     /// Detection limit of each candidate as a coordinate of its amplitude; `None` where the record does not excite it.
     pub limits: Vec<Option<f64>>,
-    /// Whether the model leaves more than noise on the searched part of the records.
+    /// Whether the model lacks fit on the searched part of the records.
     pub lacks_fit: bool,
     /// How much the windows disagree on each effect of the reported model; empty without one.
     pub(crate) heterogeneity: Vec<Heterogeneity>,
@@ -161,7 +161,7 @@ pub fn name(
             screen_again(here, &columns, model)
         };
         let at_model = if number == 0 { linearisation.clone() } else { linearise(here, model) };
-        // What is left where a model lacks fit is signal: it is no measure of what chance gains.
+        // Under lack of fit the residual is signal; the null threshold does not apply.
         let searched = if lacks_fit(here, model.loss) { 0.0 } else { threshold };
         let selected =
             SelectionRound::selected(here, &at_model, &columns, model, screening, searched, progress);
@@ -323,12 +323,12 @@ pub(crate) fn share_removed(before: f64, after: f64) -> f64 {
     if before > 0.0 { (1.0 - after / before).clamp(0.0, 1.0) } else { 0.0 }
 }
 
-/// Whether a model with this loss leaves more than noise.
+/// Whether a model with this penalised loss lacks fit.
 fn lacks_fit(engine: &Engine<'_>, loss: f64) -> bool {
     loss > lack_of_fit_per_dof(engine.is_linked()) * engine.scaled_dof.iter().sum::<f64>()
 }
 
-/// Whether a model leaves more than noise on one of the axes, where each counts: the other one would hide it in the sum.
+/// Whether a model lacks fit on one of the axes, where each counts: the other one would hide it in the sum.
 fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &FittedModel) -> bool {
     let lacks_on = |axes| {
         let (loss, dof) = engine.loss_on(axes, &model.squares);

@@ -109,7 +109,7 @@ pub(crate) fn verify(
         confirmed: !worse && is_better(power_before, power_after),
         worse,
         adequate: chi2_after <= null.range[1],
-        more_missing: leaves_more(chi2_after, null.range, record.linked),
+        more_missing: lacks_fit(chi2_after, null.range, record.linked),
     };
     let traces = traces::traces(&before, &after);
     Verified { misfit, verification, traces }
@@ -121,8 +121,8 @@ pub(crate) fn drawn(before: &RigParameters, after: &RigParameters, record: &Grid
     traces::traces(&before, &after)
 }
 
-/// Whether a model leaves more than noise: above the null range, and by as much as an inadequate model of training records.
-pub(crate) fn leaves_more(chi2: f64, [least, most]: [f64; 2], linked: bool) -> bool {
+/// Whether a model lacks fit: chi2 above the null range, and by as much as an inadequate model of training records.
+pub(crate) fn lacks_fit(chi2: f64, [least, most]: [f64; 2], linked: bool) -> bool {
     chi2 > most && (chi2 / (0.5 * (least + most))).ln() > lack_of_fit_per_dof(linked)
 }
 

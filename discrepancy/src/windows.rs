@@ -195,17 +195,17 @@ impl<'a> Windows<'a> {
 
     /// Whitened residual of a simulation, force spikes removed and start states projected out.
     pub(crate) fn residual(&self, simulated: &[f64]) -> Vec<f64> {
-        let mut left = self.raw_residual(simulated);
-        self.project_windows(&mut left);
-        left
+        let mut residual = self.raw_residual(simulated);
+        self.project_windows(&mut residual);
+        residual
     }
 
     /// The same without the projection.
     fn raw_residual(&self, simulated: &[f64]) -> Vec<f64> {
-        let mut left: Vec<f64> =
+        let mut residual: Vec<f64> =
             self.readings.iter().zip(simulated).map(|(reading, simulated)| reading - simulated).collect();
-        self.clean(&mut left);
-        left
+        self.clean(&mut residual);
+        residual
     }
 
     /// Difference of two simulations, processed like a residual.

@@ -150,7 +150,7 @@ pub fn open(path: &Path, options: &ReadOptions, rig: &RigParameters) -> Result<C
     Ok(CheckedRecord { checked, gridded })
 }
 
-/// Checks the records, selects effects, locates what is left, extends the rig file, then judges on the held-out record.
+/// Checks the records, selects effects, locates the discrepancy, extends the rig file, then judges on the held-out record.
 ///
 /// # Errors
 /// [`WorkflowError`]; a record that cannot be used is a verdict, not an error.

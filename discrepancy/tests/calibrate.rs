@@ -89,8 +89,8 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
         .expect("a rig file");
     let after = RigParameters::from_toml(&text, "rig.toml").expect("it was read once");
     let chi2 = |rig: &RigParameters| {
-        let left = engine.residual(&engine.simulate(rig));
-        left.iter().map(|value| value * value).sum::<f64>() / engine.scaled_dof.iter().sum::<f64>()
+        let residual = engine.residual(&engine.simulate(rig));
+        residual.iter().map(|value| value * value).sum::<f64>() / engine.scaled_dof.iter().sum::<f64>()
     };
     assert!(chi2(&after) < 1.1 && chi2(&rig) > 10.0, "{} {}", chi2(&rig), chi2(&after));
 }

@@ -3,7 +3,7 @@
 //! ```text
 //!   measured, model ──► zero-phase Chebyshev I, every n-th row ──► rows that meet the condition ──► residual
 //! ```
-//! Measured and modelled go through the same filter, so that numbers do not change, and a residual is what is left behind it.
+//! Measured and modelled go through the same filter, so that numbers do not change; residuals are those of the filtered signals.
 
 use crate::file::{Expression, Model};
 use crate::names::{Symbol, resolve};

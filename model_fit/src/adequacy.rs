@@ -1,7 +1,7 @@
-//! Whether what the fitted model leaves of an output is its noise.
+//! Tests whether the residual of an output is its noise.
 //!
 //! ```text
-//!   rms^2 = sum e_i^2 / n                          what is left on the training records
+//!   rms^2 = sum e_i^2 / n                          e: residual on the training records
 //!   s^2   = noise of the file, or sum (e_(i+1) - e_i)^2 / (2 m) over m pairs of neighbouring rows
 //!   b^2   = rms^2 - s^2 - model_error^2            what is neither
 //! ```
@@ -20,14 +20,14 @@ use crate::stats::mean_and_variance;
 use model::Failure;
 use serde::Serialize;
 
-/// Least share of the power left that is neither noise nor model error.
+/// Least share of the residual's power that is neither noise nor model error.
 const MOST_OF_IT: f64 = 0.5;
 /// Standard errors of that share.
 const CERTAIN: f64 = 3.0;
 /// Share of an output's standard deviation below which nothing is called missing: integration and rounding of a file.
 const NEGLIGIBLE: f64 = 1e-3;
 
-/// What the reported model leaves of an output on all training records.
+/// Residual of an output over all training records, under the reported model.
 #[derive(Clone, Debug, Serialize)]
 pub struct Residual {
     pub(crate) output: String,
@@ -52,7 +52,7 @@ impl Residual {
         self.rms.powi(2) - self.noise.powi(2) - self.model_error_rms.powi(2)
     }
 
-    /// How much is left, of what, and how large its noise is.
+    /// The residual's rms beside the signal's and the noise.
     #[must_use]
     pub fn in_words(&self) -> String {
         let Self { output, unit, .. } = self;
@@ -65,23 +65,24 @@ impl Residual {
     }
 }
 
-/// What a fitted model leaves of each output.
+/// Residual of each output under a fitted model.
 pub(super) fn residuals(fitted: &Fitted<'_>) -> Result<Vec<Residual>, Failure> {
     let fitting = &fitted.fitting;
-    let left = fitting.residuals(&fitted.point.values_si)?;
-    Ok((0..fitting.model.outputs.len()).map(|output| residual(fitting, &left, output)).collect())
+    let residuals = fitting.residuals(&fitted.point.values_si)?;
+    Ok((0..fitting.model.outputs.len()).map(|output| residual(fitting, &residuals, output)).collect())
 }
 
-fn residual(fitting: &Fitting<'_>, left: &[OutputSeries], output: usize) -> Residual {
+fn residual(fitting: &Fitting<'_>, residuals: &[OutputSeries], output: usize) -> Residual {
     let of_model = &fitting.model.outputs[output];
     let every = fitting.model.rows.every;
     let (mut differences, mut measured, mut squares) = (Vec::new(), Vec::new(), 0.0);
-    for (record, left) in fitting.records.iter().zip(left) {
-        let [left, _] = &left[output];
-        for (row, value) in left.iter().enumerate().filter(|(_, value)| value.is_finite()) {
+    for (record, of_record) in fitting.records.iter().zip(residuals) {
+        let [residual, _] = &of_record[output];
+        for (row, value) in residual.iter().enumerate().filter(|(_, value)| value.is_finite()) {
             squares += value * value;
             let next = record.rows.get(row + 1).filter(|next| **next == record.rows[row] + every);
-            let difference = next.map(|_| left[row + 1] - value).filter(|difference| difference.is_finite());
+            let difference =
+                next.map(|_| residual[row + 1] - value).filter(|difference| difference.is_finite());
             differences.extend(difference);
         }
         measured.extend(record.outputs[output].iter().flatten().copied());
@@ -112,7 +113,7 @@ fn residual(fitting: &Fitting<'_>, left: &[OutputSeries], output: usize) -> Resi
 }
 
 impl ModelReport {
-    /// Takes what is left into the verdict and the headline, after the held-out records have been.
+    /// Takes the residuals into the verdict and the headline, after the held-out records have been.
     pub(super) fn rate(&mut self, residuals: Vec<Residual>) {
         let worst = residuals.iter().filter(|one| !one.is_noise).max_by(|one, other| {
             let [one, other] = [one, other].map(|one| one.excess_squared() / one.signal_rms.powi(2));
@@ -120,13 +121,13 @@ impl ModelReport {
         });
         self.adequate = worst.is_none();
         if let Some(worst) = worst {
-            let left = worst.in_words();
+            let residual = worst.in_words();
             self.headline = match self.verdict {
                 Verdict::NothingMissing if self.suspects.is_empty() => {
-                    format!("{}, and what is left is more than noise: {left}", self.headline)
+                    format!("{}, and what is left is more than noise: {residual}", self.headline)
                 }
-                Verdict::NothingMissing => format!("None of the suspects explains what is left: {left}"),
-                _ => format!("{}; more is missing beside: {left}", self.headline),
+                Verdict::NothingMissing => format!("None of the suspects explains what is left: {residual}"),
+                _ => format!("{}; more is missing beside: {residual}", self.headline),
             };
             if self.verdict == Verdict::NothingMissing {
                 self.verdict = Verdict::OutsideCatalogue;

@@ -9,7 +9,7 @@ const NEAR_OF_RANGE: f64 = 1e-3;
 const WEAK: f64 = 0.5;
 /// Tolerances from what a file expects, from which on a number is remarked.
 const UNEXPECTED: f64 = 3.0;
-/// What is left of a held-out record over what is left of the training records, from which on it is remarked.
+/// Ratio of a held-out record's residual rms to that of the training records from which on it is remarked.
 const MUCH_WORSE: f64 = 3.0;
 
 pub(super) fn is_at_bound(value_si: f64, range_si: [f64; 2]) -> bool {
@@ -66,18 +66,18 @@ fn unexpected(number: &ParameterEstimate) -> Option<String> {
 }
 
 impl ModelReport {
-    /// Held-out records of which the reported model leaves much more than of the training records: each with the ratio.
+    /// Held-out records with a much larger residual than the training records under the reported model: each with the ratio.
     pub(super) fn much_worse(&self) -> Vec<String> {
-        let of = |left: &super::ResidualComparison| {
-            let fitted = self.training.iter().find(|fitted| fitted.output == left.output)?;
-            let ratio = left.rms_after / fitted.rms_after;
+        let of = |residual: &super::ResidualComparison| {
+            let fitted = self.training.iter().find(|fitted| fitted.output == residual.output)?;
+            let ratio = residual.rms_after / fitted.rms_after;
             (fitted.rms_after > 0.0 && ratio > MUCH_WORSE).then(|| {
                 format!(
                     "on {} {} {} {} rms is left, {ratio:.1} times that of the training records",
-                    left.record,
-                    left.output,
-                    significant(left.rms_after),
-                    left.unit
+                    residual.record,
+                    residual.output,
+                    significant(residual.rms_after),
+                    residual.unit
                 )
             })
         };

@@ -9,7 +9,7 @@
 //! |---|---|
 //! | `described` | what was found, in a report |
 //! | `features` | the terms, as suspects |
-//! | `place` | where what is left comes from, whatever the law |
+//! | `place` | where the residual comes from, whatever the law |
 //! | `screen` | gains of all terms, stability |
 //!
 //! A term is taken under the gates of a suspect ([`super::select`]), where the penalty counts every term of the search, and if

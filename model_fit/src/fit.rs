@@ -29,7 +29,7 @@ pub(super) const OPTIONS: Options = Options {
 const TOLERANCE_PER_SAMPLE: f64 = 1e-4;
 /// Share of the predicted reduction of the loss from which a step is taken without another.
 const SUFFICIENT_REDUCTION_RATIO: f64 = 0.75;
-/// Noise of an output is at least this share of its size: a fit that leaves nothing has no likelihood.
+/// Noise of an output is at least this share of its size: a fit without a residual has no likelihood.
 const LEAST_NOISE: f64 = 1e-9;
 
 /// Shortest time constant of a library over the period of the samples.

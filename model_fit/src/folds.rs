@@ -120,8 +120,8 @@ pub(super) fn refitted(fitted: &Fitted<'_>) -> Option<Folds> {
         let squares = |output: usize| {
             let of_record = residuals.iter().zip(&cut.block_of).map(|(record, blocks)| {
                 let rows = record[output][0].iter().zip(blocks);
-                rows.filter(|(left, of)| **of == block && left.is_finite())
-                    .map(|(left, _)| left * left)
+                rows.filter(|(residual, of)| **of == block && residual.is_finite())
+                    .map(|(residual, _)| residual * residual)
                     .sum::<f64>()
             });
             of_record.sum()
@@ -131,7 +131,7 @@ pub(super) fn refitted(fitted: &Fitted<'_>) -> Option<Folds> {
     parallel::map_range(0..cut.blocks, without).into_iter().collect()
 }
 
-/// Folds in units of what `reference` leaves of each output.
+/// Folds in units of the residual variance of each output under `reference`.
 pub(super) fn in_units(folds: &Folds, reference: &Fitted<'_>) -> Vec<f64> {
     let weight = |output: usize| 1.0 / reference.fitting.variance(output, reference.point.squares[output]);
     let fold = |squares: &Vec<f64>| {
@@ -140,7 +140,7 @@ pub(super) fn in_units(folds: &Folds, reference: &Fitted<'_>) -> Vec<f64> {
     folds.iter().map(fold).collect()
 }
 
-/// What each fold gains, in units of what is left before.
+/// What each fold gains, in units of the residual variance under `reference`.
 pub(super) fn gained(before: &Folds, after: &Folds, reference: &Fitted<'_>) -> Vec<f64> {
     let [before, after] = [before, after].map(|folds| in_units(folds, reference));
     before.iter().zip(after).map(|(before, after)| before - after).collect()

@@ -10,7 +10,7 @@ use model::{Failure, Model, Program};
 /// Largest ratio of a signal's rms after to before.
 pub const WORSE: f64 = 1.02;
 
-/// What is left of an output on a record by both models, the baseline's first.
+/// Residual rms of an output on a record under both models, the baseline's first.
 #[derive(Clone, Debug)]
 pub(crate) struct HeldOutResidual {
     pub(crate) record: usize,
@@ -79,12 +79,16 @@ pub(crate) fn judge(
         let (before, first_row) = residuals(&found.baseline, one)?;
         let (after, _) = residuals(&found.extended, one)?;
         let outputs = before.into_iter().zip(after).enumerate().map(
-            |(output, ([left, predicted], [left_after, extended]))| {
-                let scored_rows = left[first_row..].iter().filter(|value| value.is_finite()).count();
-                let rms_si = [&left, &left_after].map(|left| rms_of(left, first_row));
+            |(output, ([residual, predicted], [residual_after, extended]))| {
+                let scored_rows = residual[first_row..].iter().filter(|value| value.is_finite()).count();
+                let rms_si = [&residual, &residual_after].map(|residual| rms_of(residual, first_row));
                 judged.push(HeldOutResidual { record: index, output, rms_si, scored_rows });
                 [
-                    left.iter().zip(&predicted).map(|(left, predicted)| left + predicted).collect(),
+                    residual
+                        .iter()
+                        .zip(&predicted)
+                        .map(|(residual, predicted)| residual + predicted)
+                        .collect(),
                     predicted,
                     extended,
                 ]
@@ -101,11 +105,11 @@ pub(crate) fn judge(
 pub(crate) struct Alternative {
     pub(crate) suspect: usize,
     pub(crate) instead_of: usize,
-    /// What the model alone and the model with it leave.
+    /// Residuals under the model alone and with it.
     pub(crate) judged: Vec<HeldOutResidual>,
 }
 
-/// What the extended model with each alternative that is as good leaves of the same records.
+/// Residuals of the same records under the extended model with each alternative that is as good.
 pub(crate) fn alternatives(
     rivals: &[Rival<'_>],
     records: &[MeasuredRecord],
@@ -117,8 +121,8 @@ pub(crate) fn alternatives(
         let fit = rival.fit.as_ref().map_err(failed)?;
         let of_record = |one: &HeldOutResidual| {
             let record = std::slice::from_ref(&records[one.record]);
-            let (left, first_row) = residuals(fit, record)?;
-            let rms_si = [one.rms_si[0], rms_of(&left[one.output][0], first_row)];
+            let (residuals, first_row) = residuals(fit, record)?;
+            let rms_si = [one.rms_si[0], rms_of(&residuals[one.output][0], first_row)];
             Ok(HeldOutResidual { rms_si, ..one.clone() })
         };
         let judged = judged.iter().map(of_record).collect::<Result<_, JudgeError>>()?;
@@ -127,14 +131,14 @@ pub(crate) fn alternatives(
     rivals.iter().filter(|rival| !rival.is_near).map(of_rival).collect()
 }
 
-fn rms_of(left: &[f64], first_row: usize) -> f64 {
-    let scored = left[first_row..].iter().filter(|value| value.is_finite());
+fn rms_of(residual: &[f64], first_row: usize) -> f64 {
+    let scored = residual[first_row..].iter().filter(|value| value.is_finite());
     let (count, squares) =
         scored.fold((0_usize, 0.0), |(count, sum), value| (count + 1, sum + value * value));
     (squares / count.max(1) as f64).sqrt()
 }
 
-/// What a fitted model leaves of a record, and the first row that is scored.
+/// Residuals of a record under a fitted model, and the first row that is scored.
 fn residuals(fitted: &Fitted<'_>, record: &[MeasuredRecord]) -> Result<(OutputSeries, usize), JudgeError> {
     let rows = fitted.fitting.model.start_samples;
     let name = || record[0].name.clone();
@@ -152,13 +156,13 @@ fn residuals(fitted: &Fitted<'_>, record: &[MeasuredRecord]) -> Result<(OutputSe
 
 /// What both models say of the training records.
 pub(crate) fn trained(found: &SearchResult<'_>) -> Result<Vec<Traces>, Failure> {
-    let left_by = |fitted: &Fitted<'_>| fitted.fitting.residuals(&fitted.point.values_si);
-    let (before, after) = (left_by(&found.baseline)?, left_by(&found.extended)?);
+    let residuals = |fitted: &Fitted<'_>| fitted.fitting.residuals(&fitted.point.values_si);
+    let (before, after) = (residuals(&found.baseline)?, residuals(&found.extended)?);
     let records = found.baseline.fitting.records.iter().zip(before.into_iter().zip(after));
     let traces = records.map(|(record, (before, after))| {
         let outputs = before.into_iter().zip(after).map(|([residual, predicted], [_, extended])| {
             let measured =
-                residual.iter().zip(&predicted).map(|(left, predicted)| left + predicted).collect();
+                residual.iter().zip(&predicted).map(|(residual, predicted)| residual + predicted).collect();
             [measured, predicted, extended]
         });
         let (outputs, record, time_s) = (outputs.collect(), record.name.clone(), record.time_s.clone());

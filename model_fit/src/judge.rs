@@ -5,7 +5,7 @@
 //! | gate | asks | against |
 //! |---|---|---|
 //! | likelihood | gain over `k ln(n) + 2 ln(suspects tried)` | chance; n: effective sample size of the best fit's residual |
-//! | folds in time | at least a tenth of the power that the model leaves | size |
+//! | folds in time | at least a tenth of the residual power of the model alone | size |
 //! | folds in time | 5 standard errors over folds, or half of the power | an error of the model that no suspect describes |
 //! | folds in time | a gain without the block that gains most, too | an event that is none of the plant's |
 //! | folds in bands of `[rows.folds]` | half of that share, at 2 standard errors over folds | what does not hold elsewhere |
@@ -22,12 +22,12 @@ use super::select::Fitted;
 use crate::estimator::Convergence;
 use model::Model;
 
-/// Least share of the power that the model leaves on held-out folds that a term must explain on folds in time; on bands half of
-/// it.
+/// Least share of the residual power of the model alone that a term must explain on held-out folds in time; on bands half of it.
 pub(super) const SHARE_FLOOR: f64 = 0.1;
-/// Share from which a term may act in some blocks of time alone, more than all else that is left, and standard errors over folds
-/// that a smaller one needs. Of 58 null records of seeds 1, 3 and 5 of the study of any plant, whose background leaves up to as
-/// much power as the noise, ten had a suspect with a share of 0.12 to 0.35, at 1.5 to 3.6 standard errors; hidden terms have 0.9.
+/// Share from which a term may act in some blocks of time alone, more than all else in the residual, and standard errors over
+/// folds that a smaller one needs. Of 58 null records of seeds 1, 3 and 5 of the study of any plant, whose background adds up to
+/// as much power as the noise, ten had a suspect with a share of 0.12 to 0.35, at 1.5 to 3.6 standard errors; hidden terms have
+/// 0.9.
 const SHARE_LARGE: f64 = 0.5;
 const T_SMALL: f64 = 5.0;
 /// Standard errors over folds that bands ask. Folds are taken as independent, although their training rows overlap [Bengio,
@@ -45,7 +45,7 @@ pub(crate) struct Evaluation {
     pub(crate) suspect: usize,
     pub(crate) gain: f64,
     pub(crate) penalty: f64,
-    /// Share of the power left out, on folds in time.
+    /// Share of the residual power that it explains, on folds in time.
     pub(crate) share: f64,
     /// Of the folds' differences.
     pub(crate) t: f64,
@@ -68,11 +68,11 @@ pub(super) struct ReferenceFits<'f, 'a> {
     pub(super) before: &'f Fitted<'a>,
 }
 
-/// Share of the power that the model alone leaves on folds which is left before: no suspect explains more.
+/// Residual power on folds before, over that of the model alone: no suspect explains more.
 pub(super) fn most_share(ReferenceFits { baseline, before }: ReferenceFits<'_, '_>) -> f64 {
-    let [plain, left] =
+    let [of_baseline, of_before] =
         [baseline, before].map(|one| in_units(&one.folds, before).iter().sum::<f64>().max(f64::MIN_POSITIVE));
-    left / plain
+    of_before / of_baseline
 }
 
 /// Judges a suspect; where its likelihood gains and its folds by linear steps lose, by folds that are fitted.
@@ -205,7 +205,7 @@ pub(super) fn weigh(round: &mut [Evaluation]) {
     }
 }
 
-/// A share of the power that the model alone leaves on folds; one that leaves much more says how many times as much.
+/// A share of the residual power of the model alone on folds; one with a much larger residual says how many times as much.
 pub(crate) fn share_in_words(share: f64) -> String {
     match share {
         share if share >= -1.0 => format!("{:.1} % of the power", share * 100.0),

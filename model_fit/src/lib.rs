@@ -28,7 +28,7 @@
 //! | `held_out` | both models on records that were not used |
 //! | `structure` | which suspects can be told apart, before any fit |
 //! | `sensors` | which state, measured, would tell suspects apart |
-//! | `adequacy` | whether what is left is noise |
+//! | `adequacy` | whether residuals are noise |
 //! | `progress` | progress of work that takes long |
 //! | `report` | the report |
 //! | `explain`, `explain_page` | equations, units, suspects in words; on a page |
@@ -166,7 +166,7 @@ pub struct ClosedModel {
 /// Where a formula is searched for what no suspect describes. None is where a suspect is named.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Search {
-    /// Where more than noise is left.
+    /// Where a residual is more than noise.
     MoreThanNoise,
     /// Wherever nothing is named.
     NothingNamed,
@@ -255,7 +255,9 @@ pub fn close(
 fn is_searched(found: &select::SearchResult<'_>, search: Search) -> Result<bool, ModelError> {
     Ok(found.accepted.is_empty()
         && match search {
-            Search::MoreThanNoise => !adequacy::residuals(&found.extended)?.iter().all(|left| left.is_noise),
+            Search::MoreThanNoise => {
+                !adequacy::residuals(&found.extended)?.iter().all(|residual| residual.is_noise)
+            }
             Search::NothingNamed => true,
             Search::Never => false,
         })
@@ -323,7 +325,7 @@ fn judged(
 }
 
 impl ClosedModel {
-    /// Whether more than noise is left, and nothing was named for it.
+    /// Whether a residual is more than noise, and nothing was named for it.
     #[must_use]
     pub fn is_unexplained(&self) -> bool {
         !self.report.adequate && self.report.named.is_empty() && self.report.discovered.is_empty()

@@ -38,7 +38,7 @@ const UNLIKE: f64 = 0.5;
 
 /// Size of a model at the values of its file over that of the record, or the other way round, from which on a unit is doubted.
 const SIZES: f64 = 30.0;
-/// Share of an output's standard deviation from which on a fit that leaves it explains nearly nothing.
+/// Residual rms over an output's standard deviation from which on a fit explains nearly nothing.
 const NEARLY_ALL: f64 = 0.95;
 
 /// A period is far from the rows' distance from this factor on: a wrong unit is off by sixty or a thousand, a wrong digit by ten.
@@ -328,7 +328,7 @@ fn correlation(predicted: &[f64], measured: &[Option<f64>]) -> f64 {
     if scale > 0.0 { products / scale } else { 0.0 }
 }
 
-/// Outputs of which the fitted model leaves more than their mean would, or nearly as much.
+/// Outputs whose residual under the fitted model is larger than about their mean, or nearly as large.
 pub(super) fn beyond_reach(fitted: &Fitted<'_>) -> Vec<String> {
     let fitting = &fitted.fitting;
     let of_output = |(output, rms_si): (usize, f64)| {
@@ -339,11 +339,11 @@ pub(super) fn beyond_reach(fitted: &Fitted<'_>) -> Vec<String> {
         let signal_si = mean_and_variance(&measured).1.sqrt();
         let unit = &of_model.unit;
         let [rms, signal] = [rms_si, signal_si].map(|value| significant(value / unit.factor));
-        let left = if rms_si > signal_si { "more" } else { "nearly as much" };
+        let much = if rms_si > signal_si { "more" } else { "nearly as much" };
         let than = if rms_si > signal_si { "than" } else { "as" };
         (signal_si > 0.0 && rms_si > NEARLY_ALL * signal_si).then(|| {
             format!(
-                "the fitted model leaves {left} of {} ({rms} {} rms) {than} its mean would ({signal}), and explains nothing of \
+                "the fitted model leaves {much} of {} ({rms} {} rms) {than} its mean would ({signal}), and explains nothing of \
                  it: {}?",
                 of_model.name,
                 unit.text,

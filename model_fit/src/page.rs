@@ -96,7 +96,8 @@ fn pictures(model: &Model, report: &ModelReport, traces: &[Traces]) -> String {
             let caption = format!("{}, {kind}{start}: {}", trace.record, what.name);
             let time_s = &trace.time_s[rows.clone()];
             let of = |which: usize| scaled[which][rows.clone()].to_vec();
-            let left = |which: usize| rows.clone().map(|row| scaled[0][row] - scaled[which][row]).collect();
+            let residual =
+                |which: usize| rows.clone().map(|row| scaled[0][row] - scaled[which][row]).collect();
             all.push(lines_over_time(
                 (&identifier, &caption, &label),
                 "Measured, the model alone and the extended model over time.",
@@ -107,7 +108,7 @@ fn pictures(model: &Model, report: &ModelReport, traces: &[Traces]) -> String {
                 (&format!("{identifier}-left"), &format!("{caption}, measured minus model"), &label),
                 "What both models leave over time.",
                 time_s,
-                &[left(1), left(2)],
+                &[residual(1), residual(2)],
             ));
         }
     }

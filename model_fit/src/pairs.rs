@@ -3,7 +3,7 @@
 //! ```text
 //!   d_si = what suspect s with its numbers at point i of their ranges changes in the outputs, less what the model's own numbers
 //!          can do (projection off their sensitivities)
-//!   r    = what the model leaves, projected likewise
+//!   r    = residual of the model, projected likewise
 //!   fall of the squares by a pair = b^T G^-1 b,   G = Gram matrix of d_si and d_tj,   b = (d_si r, d_tj r), both shares positive
 //! ```
 //! The pairs with the largest fall are fitted in the simulator, from these points and from the fits of each suspect alone. A pair
@@ -39,7 +39,7 @@ struct Response {
     suspect: usize,
     values_si: Vec<(UnknownId, f64)>,
     change: DVector<f64>,
-    /// Its product with what the model leaves, and with itself.
+    /// Its product with the model's residual, and with itself.
     gain: f64,
     size: f64,
 }
@@ -250,23 +250,23 @@ fn fit<'a>(
 mod tests {
     use super::*;
 
-    fn response(suspect: usize, change: [f64; 2], left: [f64; 2]) -> Response {
-        let (change, left) = (DVector::from_row_slice(&change), DVector::from_row_slice(&left));
-        let (gain, size) = (change.dot(&left), change.norm_squared());
+    fn response(suspect: usize, change: [f64; 2], residual: [f64; 2]) -> Response {
+        let (change, residual) = (DVector::from_row_slice(&change), DVector::from_row_slice(&residual));
+        let (gain, size) = (change.dot(&residual), change.norm_squared());
         Response { suspect, values_si: Vec::new(), change, gain, size }
     }
 
     #[test]
     fn two_that_oppose_each_other_fall_further_than_each_alone() {
-        // Neither direction is near to what is left, (0, 1); their sum is, and explains all of its square.
-        let left = [0.0, 1.0];
-        let [one, other] = [response(0, [1.0, 0.2], left), response(1, [-1.0, 0.2], left)];
+        // Neither direction is near to the residual, (0, 1); their sum is, and explains all of its square.
+        let residual = [0.0, 1.0];
+        let [one, other] = [response(0, [1.0, 0.2], residual), response(1, [-1.0, 0.2], residual)];
         assert!(one.gain * one.gain / one.size < 0.05);
         assert!((fall(&one, &other).unwrap() - 1.0).abs() < 1e-12);
         // A share that would have to be negative is no pair, and neither are two of one direction.
-        assert!(fall(&one, &response(1, [1.0, -0.1], left)).is_none());
-        assert!(fall(&one, &response(1, [2.0, 0.4], left)).is_none());
-        let responses = [one, other, response(2, [1.0, 0.0], left)];
+        assert!(fall(&one, &response(1, [1.0, -0.1], residual)).is_none());
+        assert!(fall(&one, &response(1, [2.0, 0.4], residual)).is_none());
+        let responses = [one, other, response(2, [1.0, 0.0], residual)];
         assert_eq!(promising(&responses)[0], ([0, 1], vec![[0, 1]]));
     }
 

@@ -42,17 +42,17 @@ pub struct ModelReport {
     pub confirmed: Option<bool>,
     /// Whether a held-out record that gets worse takes back what `named` and `discovered` have.
     pub taken_back: bool,
-    /// Whether the reported model leaves no more than noise and declared error on the training records.
+    /// Whether residuals of the reported model on the training records are no more than noise and declared error.
     pub adequate: bool,
-    /// What it leaves of each output, and its noise.
+    /// Its residual of each output, and the noise.
     #[serde(skip_deserializing)]
     pub residuals: Vec<Residual>,
     /// Numbers of the extended model, with what they were beside the model alone.
     pub parameters: Vec<ParameterEstimate>,
-    /// What is left on the training records.
+    /// Residuals on the training records.
     #[serde(skip_deserializing)]
     pub training: Vec<ResidualComparison>,
-    /// What is left on each held-out record.
+    /// Residuals on each held-out record.
     #[serde(skip_deserializing)]
     pub held_out: Vec<ResidualComparison>,
     /// The same with each alternative in place of what was named.
@@ -62,7 +62,7 @@ pub struct ModelReport {
     pub named: Vec<NamedSuspect>,
     /// Where nothing was named and a search found some: terms that no suspect describes.
     pub discovered: Vec<DiscoveredTerm>,
-    /// Where what the model alone leaves comes from, whatever the suspects are; `None` where no place explains enough of it.
+    /// Where the residual of the model alone comes from, whatever the suspects are; `None` where no place explains enough of it.
     #[serde(skip_deserializing)]
     pub located: Option<Located>,
     /// Every suspect beside the model alone, the most likely first.
@@ -173,7 +173,7 @@ pub struct SuspectJudgement {
     /// Twice the gain in log likelihood, and what chance is granted of it.
     pub(crate) gain: f64,
     pub(crate) penalty: f64,
-    /// Share of what the model leaves, on folds in time.
+    /// Share of the residual power, on folds in time.
     pub(crate) share: f64,
     /// Mean gain of a fold over its standard error.
     #[serde(rename = "clustered_t")]
@@ -330,8 +330,8 @@ impl ModelReport {
             return;
         }
         let worse: Vec<&ResidualComparison> =
-            self.held_out.iter().filter(|left| left.rms_after > WORSE * left.rms_before).collect();
-        let better = self.held_out.iter().any(|left| left.rms_after < left.rms_before / WORSE);
+            self.held_out.iter().filter(|one| one.rms_after > WORSE * one.rms_before).collect();
+        let better = self.held_out.iter().any(|one| one.rms_after < one.rms_before / WORSE);
         self.confirmed = Some(better && worse.is_empty());
         if let Some(ResidualComparison { record, output, unit, rms_before, rms_after, .. }) = worse.first() {
             let [before, after] = [rms_before, rms_after].map(|rms| significant(*rms));

@@ -6,7 +6,7 @@ use super::record::MeasuredRecord;
 use model::Failure;
 
 impl Fitting<'_> {
-    /// What the model leaves, and what it says: record by record, output by output; NaN where nothing was measured.
+    /// Residuals and predictions, record by record, output by output; a residual is NaN where nothing was measured.
     pub(crate) fn residuals(&self, values_si: &[f64]) -> Result<Vec<OutputSeries>, Failure> {
         let mut all = Vec::new();
         for (record, measured) in self.records.iter().enumerate() {

@@ -133,7 +133,7 @@ pub(crate) fn search<'a>(
                 Err(_) => {}
             }
         }
-        // Rivals are compared in samples of the one that leaves least: each one's own count would favour what leaves more.
+        // Rivals share the effective sample size of the best fit: each one's own would favour a larger, more correlated residual.
         let least = fits.iter().min_by(|one, other| one.point.loss.total_cmp(&other.point.loss));
         let effective = least.map_or(Vec::new(), |least| least.effective.clone());
         let pairs = tried.iter().zip(&fits);
@@ -197,7 +197,7 @@ impl<'a> SearchResult<'a> {
         ReferenceFits { baseline: &self.baseline, before: &self.extended }
     }
 
-    /// Whether nothing more can be taken: what is left is less than a term must explain.
+    /// Whether nothing more can be taken: the residual power is less than a term must explain.
     fn is_over(&self) -> bool {
         let is_little = || most_share(self.reference_fits()) <= SHARE_FLOOR;
         self.accepted.len() >= MOST_TERMS || !self.accepted.is_empty() && is_little()
@@ -257,7 +257,7 @@ impl Fitted<'_> {
         Some(Self { folds, ..self.clone() })
     }
 
-    /// Root mean square of what is left of each output.
+    /// Rms residual of each output.
     pub(crate) fn rms_si(&self) -> Vec<f64> {
         let squares = self.point.squares.iter().enumerate();
         squares.map(|(output, squares)| (squares / self.fitting.count(output).max(1.0)).sqrt()).collect()
@@ -326,7 +326,7 @@ pub(super) fn effective_sample_sizes(fitting: &Fitting<'_>, point: &Point) -> Re
     Ok(residuals.iter().enumerate().map(of_output).collect())
 }
 
-/// What is left of each output, record by record, where something was measured.
+/// Residual of each output, record by record, where something was measured.
 fn series(fitting: &Fitting<'_>, point: &Point) -> Result<Vec<Vec<Vec<f64>>>, Failure> {
     let residuals = fitting.residuals(&point.values_si)?;
     let of_output = |output: usize| {

@@ -1,8 +1,8 @@
 //! Which state, measured, would show a suspect that hides, or tell two apart that do the same.
 //!
 //! Each state that no output reports is added as one, with a sensor that is as good as those there are: its noise over the
-//! variation of the state is the least that the model leaves of an output over that output's variation. The sensitivities are
-//! those of the model at its fit, so that nothing is fitted.
+//! variation of the state is the least ratio of an output's residual to that output's variation. The sensitivities are those of
+//! the model at its fit, so that nothing is fitted.
 
 use super::fit::Fitting;
 use super::record::MeasuredRecord;
@@ -106,7 +106,7 @@ fn with_sensor(
     base.responses(&asked).ok().map(|(responses, ..)| responses)
 }
 
-/// The least that is left of an output over its variation.
+/// The least ratio of an output's residual to its variation.
 fn least_noise(baseline: &Fitted<'_>, scale: &[f64]) -> f64 {
     let records = baseline.fitting.records;
     let of = |(output, scale): (usize, &f64)| {

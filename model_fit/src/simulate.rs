@@ -47,14 +47,14 @@ pub fn simulate(file: &Path, record: &Path) -> Result<SimulatedRecord, ModelErro
     let predicted = fitting.residuals(&fitting.start())?.pop().expect("one record");
     let record = &records[0];
     let outputs = model.outputs.iter().zip(&predicted).zip(&record.outputs);
-    let outputs = outputs.map(|((output, [left, _]), measured)| {
-        let left: Vec<f64> = left.iter().copied().filter(|left| !left.is_nan()).collect();
-        let squares: f64 = left.iter().map(|left| left * left).sum();
+    let outputs = outputs.map(|((output, [residual, _]), measured)| {
+        let residual: Vec<f64> = residual.iter().copied().filter(|value| !value.is_nan()).collect();
+        let squares: f64 = residual.iter().map(|value| value * value).sum();
         let measured: Vec<f64> = measured.iter().flatten().copied().collect();
         SimulatedOutput {
             output: output.name.clone(),
             unit: output.unit.text.clone(),
-            rms: (squares / left.len() as f64).sqrt() / output.unit.factor,
+            rms: (squares / residual.len() as f64).sqrt() / output.unit.factor,
             signal_rms: mean_and_variance(&measured).1.sqrt() / output.unit.factor,
         }
     });
@@ -119,7 +119,7 @@ fn table(model: &Model, record: &MeasuredRecord, predicted: &[&Vec<f64>]) -> Str
     text
 }
 
-/// Ten digits: what a way to SI and back has left is none of the record's.
+/// Ten digits: rounding by the conversion to SI and back is none of the record's.
 fn rounded(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
 }

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | values of the file, those of the smaller fit, each value of the newest suspect | at most 12 |
 //! | numbers of the newest suspect over their ranges, all others as in the smaller fit | 4 to 24, by the length of the records |
-//! | the newest suspect without effect: a number at 0 or at an end of its range that leaves what the smaller does | at most 1 |
+//! | the newest suspect without effect: a number at 0 or an end of its range, where the loss is the smaller fit's | at most 1 |
 //! | points of a Halton sequence around them, those with the least loss | three of `[fit] starts` |
 //!
 //! A point is spread over a fifth to five times each number, as far as its range allows; a number that may change its sign over
@@ -215,7 +215,7 @@ fn within_range(value: f64, [least, most]: [f64; 2], share: f64) -> f64 {
     if least > 0.0 { least * libm::pow(most / least, share) } else { most * share }
 }
 
-/// A starting point that leaves what the smaller fit leaves: a larger model must not end above it.
+/// A starting point with no more loss than the smaller fit: a larger model must not end above it.
 fn without_effect(fitting: &Fitting<'_>, suspect: usize, first: &[f64], loss: f64) -> Option<Vec<f64>> {
     let candidates = places_of(fitting, suspect).into_iter().flat_map(|place| {
         let [least, most] = fitting.unknowns[place].range_si;

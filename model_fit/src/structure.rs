@@ -1,15 +1,15 @@
 //! What the records can tell apart, from sensitivities alone, before a suspect is fitted.
 //!
 //! ```text
-//!   d_s = what suspect s, at its first values, changes in the outputs, in units of what the model leaves of each
+//!   d_s = what suspect s, at its first values, changes in the outputs, in units of the model's residual of each
 //!   r_s = d_s less what the model's own numbers could do for it (projection off their sensitivities)
 //!   seen share = |r_s| / |d_s|          cosine of two suspects = r_s r_t / (|r_s| |r_t|)
 //! ```
 //! Two suspects are twins where the cosine is above 0.98 and a fit of one in place of the other is predicted to cost less than
-//! what tells two suspects apart. With e = what one explains of what the model leaves, less the part along the other:
+//! what tells two suspects apart. With e = what one explains of the model's residual, less the part along the other:
 //!
 //! ```text
-//!   cost = sum over outputs of  n ln(1 + |e|^2 / rss)        rss, n: what the best fit leaves, in independent samples
+//!   cost = sum over outputs of  n ln(1 + |e|^2 / rss)        rss: residual squares of the best fit, n: independent samples
 //! ```
 //! A large term is told apart at a cosine at which a small one is not. A suspect that does nothing because a number of it starts
 //! at 0 is taken by what it does per unit of that number; of several by the one that the model's own numbers can do least.
@@ -101,7 +101,7 @@ impl Advice {
     }
 }
 
-/// What can be told apart beside the model alone; `best` is the fit that leaves least.
+/// What can be told apart beside the model alone; `best` is the fit with the least residual.
 pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     let (fitting, point) = (&baseline.fitting, &baseline.point);
     let model = fitting.model;
@@ -122,9 +122,9 @@ pub(crate) fn structure(baseline: &Fitted<'_>, best: &Fitted<'_>) -> Structure {
     let suspects = responses.iter().filter(|one| one.change == 0.0).map(|one| name(one.suspect));
     let without_effect = numbers.chain(suspects).collect();
     let hidden: Vec<usize> = responses.iter().filter(|one| one.is_hidden()).map(|one| one.suspect).collect();
-    let left = DVector::from_vec(fitting.measured(&scale)) - base;
+    let residual = DVector::from_vec(fitting.measured(&scale)) - base;
     let cost = |one: &SuspectResponse, other: &SuspectResponse| {
-        let along = one.direction.dot(&left);
+        let along = one.direction.dot(&residual);
         let apart = (&one.direction - &other.direction * one.direction.dot(&other.direction)) * along;
         let mut squares = vec![0.0; scale.len()];
         for (output, value) in fitting.outputs_of_samples().into_iter().zip(apart.iter()) {
@@ -164,7 +164,7 @@ pub(super) struct SuspectResponse {
     pub(super) suspect: usize,
     /// Share of the change that the projection leaves, and its direction.
     pub(super) share: f64,
-    /// Size of its change, in units of what the model leaves.
+    /// Size of its change, in units of the model's residual.
     change: f64,
     direction: DVector<f64>,
 }
@@ -293,7 +293,7 @@ impl<'a> ReferenceModel<'a> {
     }
 }
 
-/// What the model leaves of each output as a unit.
+/// Reciprocal of the residual's standard deviation, output by output.
 fn scale(fitting: &Fitting<'_>, point: &Point) -> Vec<f64> {
     let variance = |output: usize| fitting.variance(output, point.squares[output]);
     (0..fitting.model.outputs.len()).map(|output| variance(output).sqrt().recip()).collect()

@@ -1,4 +1,4 @@
-//! Whether a report says that what is left is more than noise.
+//! Whether a report says that a residual is more than noise.
 
 use crate::closing::{close, file, random};
 use model_fit::{ClosedModel, Verdict};
@@ -48,10 +48,10 @@ fn a_residual_that_is_no_noise_and_no_suspect_is_not_called_nothing_missing() {
     assert_eq!((report.verdict, report.adequate), (Verdict::OutsideCatalogue, false), "{}", report.headline);
     let headline = &report.headline;
     assert!(headline.starts_with("None of the suspects explains what is left: y 0.3"), "{headline}");
-    let left = &report.residuals[0];
+    let residual = &report.residuals[0];
     // The sine has an rms of 0.35, and moves by 0.025 rms from row to row.
-    assert!((left.rms - 0.37).abs() < 0.03 && (left.noise - 0.1).abs() < 0.02, "{left:?}");
-    assert!(!left.is_noise_declared && left.signal_rms > 3.0, "{left:?}");
+    assert!((residual.rms - 0.37).abs() < 0.03 && (residual.noise - 0.1).abs() < 0.02, "{residual:?}");
+    assert!(!residual.is_noise_declared && residual.signal_rms > 3.0, "{residual:?}");
     assert!(found.is_unexplained() && found.page.contains("more than noise"));
 }
 

@@ -48,7 +48,7 @@ fn is_in_the_equation_of_v(term: &DiscoveredTerm, variables: &str) {
     assert_eq!(found, ("equation of v", variables.to_owned()), "{term:?}");
 }
 
-/// What is left without it hangs together over the whole record; straight lines alone call it a constant.
+/// The residual without it is correlated over the whole record; straight lines alone call it a constant.
 #[test]
 fn a_strong_spring_on_one_side_is_placed_with_its_variable() {
     let report = closed(Search::Never, |x, _, _| 60.0 * x.max(0.0)).report;
@@ -68,7 +68,7 @@ fn a_product_that_no_suspect_describes_is_found_with_its_variables_and_written()
     is_in_the_equation_of_v(term, "x,v");
     assert!(term.stability >= 0.6 && closed.page.contains("What a search found"), "{term:?}");
     assert!(closed.page.contains("± 2 standard errors of its numbers"), "what it looks like");
-    // The formula says it, and nothing but noise is left.
+    // The formula says it, and the residual is noise.
     assert!(report.adequate && report.located.is_some(), "{:?}", report.located);
     assert!(!closed.page.contains("Where it comes from"));
     let extended = file(folder.path(), "extended.toml", &closed.extended.unwrap());

@@ -11,10 +11,10 @@ fn the_page_of_a_first_model_prints_what_comes() {
     let page = std::fs::read_to_string(docs.join("first-model.md")).unwrap();
     let report = close(&file, &[train], &[test]).unwrap().report;
     let mut lines = vec![format!("Cart: {}.", report.headline)];
-    lines.extend(report.training.iter().chain(&report.held_out).map(|left| {
+    lines.extend(report.training.iter().chain(&report.held_out).map(|one| {
         format!(
             "{}: speed {:.4} mm/s rms with the model, {:.4} extended",
-            left.record, left.rms_before, left.rms_after
+            one.record, one.rms_before, one.rms_after
         )
     }));
     for line in &lines {

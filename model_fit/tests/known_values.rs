@@ -41,16 +41,13 @@ fn a_fit_takes_the_mass_of_each_record_and_is_wrong_with_one_mass_for_both() {
     let fitted = |text: &str| {
         let model = file(folder, "model.toml", text);
         let report = close(&model, &train, &[]).unwrap_or_else(|error| panic!("{error}")).report;
-        (
-            number(&report, "drag").value,
-            report.training.iter().map(|left| left.rms_before).fold(0.0, f64::max),
-        )
+        (number(&report, "drag").value, report.training.iter().map(|one| one.rms_before).fold(0.0, f64::max))
     };
-    let (drag, left) = fitted(MODEL);
-    assert!((drag - 4.0).abs() < 0.01 && left < 1e-3, "{drag} N s/m, {left} m/s left");
+    let (drag, rms) = fitted(MODEL);
+    assert!((drag - 4.0).abs() < 0.01 && rms < 1e-3, "{drag} N s/m, residual {rms} m/s");
     let known = r#"values = { "light/run.csv" = 2.5, "heavy.csv" = 5 }"#;
-    let (drag, left) = fitted(&MODEL.replace(known, "value = 3.75, fixed = true"));
-    assert!((drag - 4.0).abs() > 0.05 && left > 0.05, "{drag} N s/m, {left} m/s left");
+    let (drag, rms) = fitted(&MODEL.replace(known, "value = 3.75, fixed = true"));
+    assert!((drag - 4.0).abs() > 0.05 && rms > 0.05, "{drag} N s/m, residual {rms} m/s");
     let model = file(folder, "model.toml", MODEL);
     let told = explain(&model, &[]).unwrap();
     assert!(told.contains("mass = 2.50 kg of light/run.csv, 5.00 kg of heavy.csv, known"), "{told}");

@@ -34,15 +34,15 @@ fn with_terms(text: &str, terms: &[&str]) -> String {
 }
 
 fn pooled(all: &[ResidualComparison], of: impl Fn(&ResidualComparison) -> f64) -> f64 {
-    let rows: usize = all.iter().map(|left| left.rows).sum();
-    (all.iter().map(|left| left.rows as f64 * of(left).powi(2)).sum::<f64>() / rows as f64).sqrt()
+    let rows: usize = all.iter().map(|one| one.rows).sum();
+    (all.iter().map(|one| one.rows as f64 * of(one).powi(2)).sum::<f64>() / rows as f64).sqrt()
 }
 
-/// Within 3 %, the figures of effects.md: what a model leaves of the training and of the held-out records.
+/// Within 3 %, the figures of effects.md: residual rms of the training and of the held-out records.
 fn leaves(text: &str, train: &[PathBuf], test: &[PathBuf], figures: [f64; 2]) {
     let report = closed(text, train, test);
-    for (left, figure) in [&report.training, &report.held_out].into_iter().zip(figures) {
-        let computed = pooled(left, |left| left.rms_before);
+    for (residuals, figure) in [&report.training, &report.held_out].into_iter().zip(figures) {
+        let computed = pooled(residuals, |one| one.rms_before);
         assert!((computed / figure - 1.0).abs() < 0.03, "{computed} is not {figure}");
     }
 }
@@ -111,14 +111,14 @@ fn an_o_ring_rubs_the_more_the_more_pressure_there_is() {
     assert!((root - line).abs() < 0.2 && root + line > 0.99, "{root} {line}");
     // 0.524 for the root; the straight line has 0.603.
     let [before, after] =
-        [|left: &ResidualComparison| left.rms_before, |left: &ResidualComparison| left.rms_after]
+        [|one: &ResidualComparison| one.rms_before, |one: &ResidualComparison| one.rms_after]
             .map(|of| pooled(&report.held_out, of));
     assert!(after <= 0.60 * before, "{before} {after}");
     let line: Vec<ResidualComparison> =
         report.held_out_alternatives.iter().map(|one| one.residual.clone()).collect();
     let suspect = report.held_out_alternatives[0].suspect.as_str();
     assert_eq!((line.len(), suspect), (2, "proportional-to-pressure"));
-    let by_line = pooled(&line, |left| left.rms_after);
+    let by_line = pooled(&line, |one| one.rms_after);
     assert!((by_line / before - 0.603).abs() < 0.005, "{by_line} {before}");
 }
 

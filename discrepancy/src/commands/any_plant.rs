@@ -127,10 +127,10 @@ pub(super) fn simulate_command(arguments: &SimulateArguments) -> Result<Exit, Co
     let simulated = simulate(model, record)?;
     let mut text = String::new();
     for one in &simulated.outputs {
-        let [left, signal] = [one.rms, one.signal_rms].map(significant::short);
+        let [residual, signal] = [one.rms, one.signal_rms].map(significant::short);
         let _ = writeln!(
             text,
-            "{}: leaves {left} {unit} rms; its mean alone would leave {signal} {unit}",
+            "{}: leaves {residual} {unit} rms; its mean alone would leave {signal} {unit}",
             one.output,
             unit = one.unit
         );
@@ -189,11 +189,11 @@ pub(super) fn new_command(arguments: &NewArguments) -> Result<Exit, CommandError
 fn in_words(report: &ModelReport) -> String {
     let mut text = format!("{}: {}.\n", report.name, report.headline);
     report.notes.iter().for_each(|note| text.push_str(&format!("  note: {note}\n")));
-    for left in report.training.iter().chain(&report.held_out) {
+    for one in report.training.iter().chain(&report.held_out) {
         let _ = writeln!(
             text,
             "{}: {} {:.4} {} rms with the model, {:.4} extended",
-            left.record, left.output, left.rms_before, left.unit, left.rms_after
+            one.record, one.output, one.rms_before, one.unit, one.rms_after
         );
     }
     for AlternativeResidual { suspect, instead_of, residual } in &report.held_out_alternatives {

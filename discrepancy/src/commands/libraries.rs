@@ -107,7 +107,7 @@ fn in_words(library: &Library, entry: &Entry) -> String {
 
 fn number(parameter: &EntryParameter) -> String {
     let unit = &parameter.quantity.unit;
-    // As it was written, without what the way to SI and back has left.
+    // As it was written, without rounding by the conversion to SI and back.
     let shown = |value: &f64| format!("{:.9e}", value / unit.factor).parse().unwrap_or(*value).to_string();
     let mut text = format!("{} [{}]", parameter.name, unit.text);
     if let Some(dimension) = &parameter.quantity.dimension {

@@ -7,7 +7,7 @@
 //!   M = 1 - S (S'WS)^-1 S'W             W window weights f_k / q_k: the term holds nothing that parameters can do
 //!   ln p(e) = - power/2 (sum_k f_k ln(q_k / f_k) + ln |1 + size^2 B C B'|) - 1/2 ln |H|
 //!             - 1/2 u' N u + 1/2 ln |N| + ln p(z) + n/2 ln 2 pi
-//!   q_k = e' (1 + size^2 B C B')^-1 e   of what is left      u  estimate of a without the term      N^-1 = 1/P + (power S'WS)^-1
+//!   q_k = e' (1 + size^2 B C B')^-1 e   of the residual      u  estimate of a without the term      N^-1 = 1/P + (power S'WS)^-1
 //! ```
 //!
 //! What parameters cannot do has the restricted likelihood (REML) of e: projecting S out of B changes nothing there. What they
@@ -401,14 +401,14 @@ mod tests {
             let factor = Cholesky::new(covariance).unwrap();
             let solved = factor.solve(&from_mean);
             let log = -0.5 * (log_determinant(&factor) + from_mean.dot(&solved));
-            // What is left at the mode, under the term.
-            let left = &from_mean - scale.powi(2) * &coordinates * coordinates.transpose() * &solved;
+            // The residual at the mode, under the term.
+            let residual = &from_mean - scale.powi(2) * &coordinates * coordinates.transpose() * &solved;
             let term = Cholesky::new(of_term(&self.inputs)).unwrap();
             let weighed = term.solve(&parameters);
             let estimate =
-                (parameters.transpose() * &weighed).try_inverse().unwrap() * weighed.transpose() * &left;
-            let left = left - parameters * estimate;
-            self.dof = left.dot(&term.solve(&left));
+                (parameters.transpose() * &weighed).try_inverse().unwrap() * weighed.transpose() * &residual;
+            let residual = residual - parameters * estimate;
+            self.dof = residual.dot(&term.solve(&residual));
             log + 0.5 * self.dof
         }
     }

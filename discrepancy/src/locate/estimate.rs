@@ -7,7 +7,7 @@
 //!
 //! r residuals over the noise of their channel, J sensitivities by finite differences, L weak priors (L_u those of the unknown
 //! inputs). Coloured noise is made white ([`super::noise_colour`]). Where constants do not describe a window, its deviations are
-//! widened by what is left, sqrt(chi2 / degrees of freedom) [Birge 1932]: a break-away inside it is no force. At rest a force
+//! widened by the residual, sqrt(chi2 / degrees of freedom) [Birge 1932]: a break-away inside it is no force. At rest a force
 //! moves nothing: an input whose posterior is not tighter than a tenth of its prior is not observable in that window. The ramp
 //! absorbs changes of the force within a window; it is not reported.
 //!
@@ -258,16 +258,16 @@ impl LinearisedWindow<'_> {
                     before = None;
                     continue;
                 };
-                let (mut whitened, mut left, mut one) = (row, residual, 1.0 / self.noise(channel));
+                let (mut whitened, mut white_residual, mut one) = (row, residual, 1.0 / self.noise(channel));
                 if let Some((row, residual)) = before {
                     whitened = (whitened - row * phi) / white;
-                    left = (left - phi * residual) / white;
+                    white_residual = (white_residual - phi * residual) / white;
                     one *= (1.0 - phi) / white;
                 }
                 before = Some((row, residual));
                 normal.syger(1.0, &whitened, &whitened, 1.0);
-                right += whitened * left;
-                squares += left * left;
+                right += whitened * white_residual;
+                squares += white_residual * white_residual;
                 used += 1;
                 if channel >= 2 {
                     pressure[channel - 2] += whitened * one;
@@ -354,9 +354,10 @@ impl Equations {
         let precision = Theta::from_fn(|at, _| prior(NUMBERS[at].0).powi(-2));
         let p = (self.normal + Normal::from_diagonal(&precision)).cholesky()?.inverse();
         let theta = p * self.right;
-        // Remaining residuals widen the deviations.
-        let left = self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
-        let birge = (left / self.dof).max(1.0).sqrt();
+        // The residual widens the deviations.
+        let residual_squares =
+            self.squares - 2.0 * theta.dot(&self.right) + theta.dot(&(self.normal * theta));
+        let birge = (residual_squares / self.dof).max(1.0).sqrt();
         let mut deviation = Theta::zeros();
         let unknown = || NUMBERS.iter().map(|one| one.0).filter(|number| number.is_unknown_input());
         for number in 0..COUNT {

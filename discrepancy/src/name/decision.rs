@@ -1,7 +1,7 @@
 //! What is named: the set of effects that is more probable than not; where none is, what the search selected, by its own rules.
 //!
 //! ```text
-//!   probability of one half and more                 the model of the search leaves more than noise      noise alone
+//!   probability of one half and more                 the model of the search lacks fit                   it is adequate
 //!   a homogeneous set of effects                     that set, with "more is missing"                    the model of the search
 //!   a heterogeneous set of effects, none of these    outside the catalogue                               the model of the search
 //!   parameters, or no explanation                    the model of the search, unless it explains         the model of the search
@@ -10,12 +10,12 @@
 //! ```
 //!
 //! A set is homogeneous where its amplitude varies between windows by [`MAX_CV_WHEN_PROBABLE`] at most; by [`MAX_CV_OF_PART`],
-//! beside at most [`MAX_PARAMETERS_MOVED`] parameters that are moved, where the model of the search leaves more than noise, and
-//! the set more than [`MOST_LOSS_LEFT`] of the loss. The model of the search has no name either where more than
-//! [`MAX_SIGNIFICANTLY_OFF`] parameters are significantly off beside it, unless an effect of it joined as a homogeneous one, or
-//! where its set is less probable than the null model (`nothing`) or than [`LEAST_PROBABLE`], which holds wherever the null model
-//! has one half; parameters that are not adequate (leave more than noise) are outside the catalogue. A set whose variation cannot
-//! be computed counts as heterogeneous.
+//! beside at most [`MAX_PARAMETERS_MOVED`] parameters that are moved, where the model of the search lacks fit, and the set leaves
+//! more than [`MOST_LOSS_LEFT`] of J. The model of the search has no name either where more than [`MAX_SIGNIFICANTLY_OFF`]
+//! parameters are significantly off beside it, unless an effect of it joined as a homogeneous one, or where its set is less
+//! probable than the null model (`nothing`) or than [`LEAST_PROBABLE`], which holds wherever the null model has one half;
+//! parameters that are not adequate (lack fit) are outside the catalogue. A set whose variation cannot be computed counts as
+//! heterogeneous.
 
 use super::elimination::{Selection, has_effect, is_same_set};
 use super::explanations::Explanation;
@@ -34,16 +34,16 @@ const DECIDES: f64 = 0.5;
 const LEAST_PROBABLE: f64 = 0.1;
 /// Coefficient of variation of an amplitude between windows above which its effect is not named, however probable. The limit of
 /// the search is stricter, since no probability speaks for the effect there. Of sets said at one half and more on seeds 15 and
-/// 3769683697404522, development seeds, right ones had 0.00 to 0.57, leaks that took over what was left of a background 1.1 to
+/// 3769683697404522, development seeds, right ones had 0.00 to 0.57, leaks that took over the rest of a background 1.1 to
 /// 1.6; these figures are of the derivative that the whole response stands for since.
 const MAX_CV_WHEN_PROBABLE: f64 = 0.75;
 /// Coefficient of variation up to which a set is named although it leaves more than [`MOST_LOSS_LEFT`]: the windows agree on it,
 /// so that the rest is something else. Of 58 first sets that left more on seeds 18 and 3411183594749679, development seeds, 12
 /// had less, of which 8 were right; of the other 46, 5 were.
 const MAX_CV_OF_PART: f64 = 0.22;
-/// Share of the loss after calibration that an explanation on which the windows agree less may leave on its axes: impostors for
-/// what was left out left 0.54 and more on seed 13, a development seed, and 0.51 on the frozen record without `inclination`; all
-/// but two right names left 0 to 0.45.
+/// Share of J after calibration that an explanation on which the windows agree less may leave on its axes: effects named in place
+/// of one that was no candidate left 0.54 and more on seed 13, a development seed, and 0.51 on the frozen record without
+/// `inclination`; all but two right names left 0 to 0.45.
 const MOST_LOSS_LEFT: f64 = 0.5;
 /// Share of the excess that a name beside effects without one needs: on seed 13 hidden effects took 0.11 to 0.86 of it, and
 /// effects named where only a background was hidden 0.04 to 0.12.
@@ -58,7 +58,7 @@ const MAX_PARAMETERS_MOVED: f64 = 3.0;
 /// Why a model with effects is no explanation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NotExplained {
-    /// It leaves more than noise, and its effects are improbable, too small for a name, or remove less than half of the loss.
+    /// It lacks fit, and its effects are improbable, too small for a name, or remove less than half of the loss.
     TooLittle,
     /// More than [`MAX_SIGNIFICANTLY_OFF`] baseline parameters are significantly off beside it.
     TooManyParametersOff,
@@ -89,7 +89,7 @@ pub(super) struct SearchOutcome {
 
 pub(super) struct Decision {
     pub(super) selection: Selection,
-    /// Whether the model leaves more than noise on the searched part of the records.
+    /// Whether the model lacks fit on the searched part of the records.
     pub(super) lacks_fit: bool,
     /// Of each effect of the model.
     pub(super) shares: Vec<f64>,
@@ -104,7 +104,7 @@ impl Decision {
         Some(&self.selection.model).filter(|_| self.explained.is_ok() && self.is_named.contains(&true))
     }
 
-    /// Parameters alone, where they leave no more than noise; else outside the catalogue.
+    /// Parameters alone, where they are adequate; else outside the catalogue.
     pub(super) fn without_names(mut self, engine: &Engine<'_>, objection: &'static str) -> Self {
         self.is_named.fill(false);
         if super::lacks_fit(engine, self.selection.calibrated.loss) {
@@ -225,10 +225,10 @@ impl Selection {
     }
 }
 
-/// Share of the loss after calibration that a model leaves on the axes that its effects act on.
+/// J over J after calibration, of windows on the axes that the model's effects act on.
 fn share_left(engine: &Engine<'_>, Selection { calibrated, model, .. }: &Selection) -> f64 {
-    let [left, before] = [model, calibrated].map(|fit| loss_on(engine, axes_of(&model.effects), fit));
-    left / before.max(1e-9)
+    let [after, before] = [model, calibrated].map(|fit| loss_on(engine, axes_of(&model.effects), fit));
+    after / before.max(1e-9)
 }
 
 #[cfg(test)]

@@ -85,8 +85,8 @@ impl Selection {
         let Self { calibrated, model, rounds } = self;
         while !model.effects.is_empty() {
             let linearisation = linearise(engine, model);
-            let left = NullDistribution::new(engine, columns, &linearisation, model);
-            let threshold = left.threshold();
+            let null = NullDistribution::new(engine, columns, &linearisation, model);
+            let threshold = null.threshold();
             let without = parallel::map_range(0..model.effects.len(), |at| {
                 let mut effects = model.effects.clone();
                 effects.remove(at);
@@ -101,7 +101,7 @@ impl Selection {
                 .filter_map(|(at, fit)| Some((at, fit?)))
                 .min_by(|left, right| left.1.loss.total_cmp(&right.1.loss));
             let Some((at, fit)) = least else { break };
-            let loss_rise = left.loss_rise(engine, &fit, model);
+            let loss_rise = null.loss_rise(engine, &fit, model);
             let safety =
                 if fit.effects.is_empty() { THRESHOLD_FACTOR_SINGLE } else { THRESHOLD_FACTOR_SEVERAL };
             let share = loss_rise / (calibrated.loss - model.loss).max(1e-9);

@@ -3,7 +3,7 @@
 //!
 //! ```text
 //!   model of the selection, then all fits by loss ──► a set of effects each ──► alike sets together ──► the first few
-//!   features of each: what it leaves, loss above the best, parameters moved, agreement of the windows, amplitude, share
+//!   features of each: loss over dof, loss above the best, parameters moved, agreement of the windows, amplitude, share
 //! ```
 //!
 //! A set has the effects that are large enough to be named; fits that differ in smaller ones beside them are the same
@@ -102,10 +102,10 @@ pub(super) fn explanations(
         });
         let named = large(best);
         let axes = axes_of(&named);
-        let [left, before] = [best, fits.parameters].map(|fit| loss_on(engine, axes, fit));
+        let [after, before] = [best, fits.parameters].map(|fit| loss_on(engine, axes, fit));
         let features = Features {
-            loss_per_dof: left / engine.loss_on(axes, &best.squares).1,
-            share: share_removed(before, left),
+            loss_per_dof: after / engine.loss_on(axes, &best.squares).1,
+            share: share_removed(before, after),
             amplitude_variation: variations,
             smallest_amplitude: Some(named.iter().map(amplitude_ratio).fold(f64::INFINITY, f64::min)),
             small_beside: best.effects.len() - named.len(),

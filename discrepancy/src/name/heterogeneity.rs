@@ -8,7 +8,7 @@
 //! A law that is nearly right has one amplitude whatever the rig does. Another one absorbs more of what is missing in some
 //! windows than in others, and its amplitude differs between them by as much as its size.
 //!
-//! The information i_k has the weight f_k / |e_k|^2 of its window: 1 / i_k is the variance by what the model leaves, not by the
+//! The information i_k has the weight f_k / |e_k|^2 of its window: 1 / i_k is the variance by the model's residual, not by the
 //! noise of the sensors, so that a bad fit looks more homogeneous than it is.
 //!
 //! Source: DerSimonian, Laird 1986, Control. Clin. Trials 7(3): random effects. Takkouche et al. 1999, Am. J. Epidemiol. 150(2):

@@ -137,7 +137,7 @@ mod tests {
         let excluded = |off: usize| outliers(&squares(off), &[10.0; 40]);
         assert_eq!(excluded(0), Vec::<usize>::new());
         assert_eq!(excluded(2), [0, 1]);
-        // A model that leaves so many is wrong in them.
+        // A model with so many outliers is wrong in them.
         assert_eq!(excluded(3), Vec::<usize>::new());
     }
 }

@@ -21,7 +21,7 @@ const CONTENDERS: usize = 6;
 const CONTENDERS_LATE: usize = 3;
 /// Smallest screened gain of a refitted candidate, as a share of the best.
 const CONTENDER_SHARE: f64 = 0.35;
-/// The same where a model leaves more than noise: what is missing beside the effect ranks first there.
+/// The same where a model lacks fit: what is missing beside the effect ranks first there.
 const CONTENDER_SHARE_INEXACT: f64 = 0.15;
 /// Smallest screened amplitude of a refitted candidate, as a share of its floor.
 const MIN_SCREENED_RATIO: f64 = 0.5;
@@ -41,7 +41,7 @@ const MAX_RELINEARISED_FITS: usize = 3;
 const MAY_BE_BEST: f64 = 0.8;
 /// Fits are close when their losses differ by less than this share of the best gain.
 const CLOSE: f64 = 0.02;
-/// Effects of a model from which on no other widths of a backlash are tried: what is left is small by then, and each width has
+/// Effects of a model from which on no other widths of a backlash are tried: the residual is small by then, and each width has
 /// start states of its own.
 const BACKLASH_BESIDE: usize = 2;
 
@@ -112,7 +112,7 @@ pub(super) struct SelectionRound<'a> {
 
 impl<'a> SelectionRound<'a> {
     /// The round of the candidates with the largest gains; `None` where none gains enough. Candidates below the amplitude floor
-    /// take part where the others leave more than noise: a real machine differs from its rig file by many of them.
+    /// take part where the others lack fit: a real machine differs from its rig file by many of them.
     pub(super) fn selected(
         engine: &Engine<'a>,
         linearisation: &Linearisation,

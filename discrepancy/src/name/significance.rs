@@ -83,8 +83,8 @@ impl Fitted<'_> {
         } else {
             Some(self.drawn_under_null(model, gain_without_best)?)
         };
-        let left = DRAWS - chance.as_ref().map_or(DRAWS, |chance| chance.draws);
-        let other = self.other(model).filter(|_| left >= AT_ONCE);
+        let remaining = DRAWS - chance.as_ref().map_or(DRAWS, |chance| chance.draws);
+        let other = self.other(model).filter(|_| remaining >= AT_ONCE);
         Some(Significance {
             effects: places(&model.effects),
             gain,
@@ -92,7 +92,7 @@ impl Fitted<'_> {
             gain_without_best,
             least_gain,
             chance,
-            other: other.and_then(|other| self.against(model, other, left)),
+            other: other.and_then(|other| self.against(model, other, remaining)),
         })
     }
 
@@ -160,7 +160,7 @@ impl<'a> GeneratingModel<'a> {
         Some(GeneratingModel { engine, rig, simulated })
     }
 
-    /// A record of it, and what the model itself leaves of that.
+    /// A record of it, and its residual under the model itself.
     fn drawn(&self, seed: u64, number: usize) -> (Engine<'a>, Vec<f64>) {
         let mut random = Pcg64::seed_from_u64(seed ^ (number as u64) << 32);
         let drawn = self.engine.drawn(&self.simulated, &mut random);

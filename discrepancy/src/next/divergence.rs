@@ -8,7 +8,7 @@
 //! ```
 //!
 //! D is the expected gain in chi2 of the true explanation over the alternative; the inner product excludes nuisance parameters
-//! (`nuisance.rs`). For signatures of hundreds of standard deviations D is large for any two that differ, but model error leaves
+//! (`nuisance.rs`). For signatures of hundreds of standard deviations D is large for any two that differ, but model error is
 //! a share e of the signature. T counts that share as noise: it equals D for a weak signature, and for a strong one T >= 25 means
 //! a cosine below 0.95. The amplitude is refitted although the first record bounds it, so that T is conservative.
 //!
@@ -98,12 +98,12 @@ fn signatures(
     let observer = Observer::new(driven, baseline, measured);
     let base = observer.run(baseline);
     let runs: Vec<ObservedRun> = rigs.iter().map(|rig| observer.run(rig)).collect();
-    let mut left: Vec<Vec<f64>> = runs
+    let mut signatures: Vec<Vec<f64>> = runs
         .iter()
         .map(|run| run.readings.iter().zip(&base.readings).map(|(value, base)| value - base).collect())
         .collect();
     let rows = observer.rows();
-    for signature in &mut left {
+    for signature in &mut signatures {
         let first = rows.min(signature.len());
         signature[..first].fill(0.0);
     }
@@ -115,13 +115,13 @@ fn signatures(
         }
         let columns = observer.sensitivities(baseline, &base, window, &mut out);
         let basis = basis(columns, &out);
-        for signature in &mut left {
+        for signature in &mut signatures {
             let part = &mut signature[span.clone()];
             part.iter_mut().zip(&out).filter(|(_, out)| **out).for_each(|(value, _)| *value = 0.0);
             project(part, &basis);
         }
     }
-    left
+    signatures
 }
 
 /// Specified noise of each channel, its rounding included.
@@ -275,9 +275,9 @@ fn basis(columns: Vec<Vec<f64>>, out: &[bool]) -> Vec<Vec<f64>> {
         let before = dot(&column, &column).sqrt();
         project(&mut column, &kept);
         project(&mut column, &kept);
-        let left = dot(&column, &column).sqrt();
-        if left > RANK * before {
-            column.iter_mut().for_each(|value| *value /= left);
+        let norm = dot(&column, &column).sqrt();
+        if norm > RANK * before {
+            column.iter_mut().for_each(|value| *value /= norm);
             kept.push(column);
         }
     }

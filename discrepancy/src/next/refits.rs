@@ -28,7 +28,7 @@ use crate::windows::Windows;
 use plant::RigParameters;
 use plant::effects::sheet::Part;
 
-/// A rehearsed record and what each explanation leaves of it.
+/// Losses of the refitted explanations on one rehearsed record.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Trial {
     /// The explanation that made it.
@@ -59,7 +59,8 @@ pub(super) struct Setting<'a> {
     pub(super) noise: &'a ReadingNoise,
     /// Axes on which the records are compared.
     pub(super) measured: [bool; 2],
-    /// What is left of each distance on a rig that is no explanation's exactly: of a truth, of each alternative.
+    /// Factor, 1 at most, on the distance of each alternative from each truth (truth, alternative): no explanation is exact, and
+    /// model error keeps alternatives nearer than their simulations are ([`Setting::shrunk_by`]).
     pub(super) shrinkage: Vec<Vec<f64>>,
 }
 
@@ -129,9 +130,9 @@ impl Setting<'_> {
 
     /// The same setting with the distances shrunk by what the training records show of them.
     ///
-    /// Alternatives that the training records leave within one indistinguishable difference although they should be farther apart
-    /// there, if one of them were exact, are kept alike by errors of the model: distances in other experiments are shrunk by as
-    /// much.
+    /// In the training records the explanations differ by one indistinguishable difference at most. Where one of them, were it
+    /// exact, would be farther from another there, model error keeps the two alike: their distances in other experiments are
+    /// divided by that expected distance.
     pub(super) fn shrunk_by(self, training: &Engine<'_>) -> Self {
         let expected = self.expected_distances(training).unwrap_or_default();
         let factor = |distance: &f64| if *distance > 1.0 { distance.recip() } else { 1.0 };

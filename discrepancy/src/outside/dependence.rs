@@ -117,17 +117,17 @@ impl Sample {
             }
         }
         let mean = |sum: &[f64; 2]| if sum[1] > 0.0 { sum[0] / sum[1] } else { 0.0 };
-        let (mut left, mut whole) = (0.0, 0.0);
+        let (mut residual, mut total) = (0.0, 0.0); // weighted sums of squares
         for at in 0..n {
             let (value, weight) = (self.values[from(at)], self.weights[from(at)]);
             let other = 1 - self.folds[at];
             let bin = &sums[bins.bin_index[at]][other];
             let middle = mean(&all[other]);
             let predicted = if bin[1] > 0.0 { mean(bin) } else { middle };
-            left += weight * (value - predicted).powi(2);
-            whole += weight * (value - middle).powi(2);
+            residual += weight * (value - predicted).powi(2);
+            total += weight * (value - middle).powi(2);
         }
-        if whole > 0.0 { 1.0 - left / whole } else { 0.0 }
+        if total > 0.0 { 1.0 - residual / total } else { 0.0 }
     }
 
     /// Weighted squares beyond their expectation.

@@ -17,7 +17,7 @@ pub(super) fn explanations(report: &Report) -> String {
         let mut cells = vec![
             text_cell(name(explanation)),
             number(words::percent(explanation.probability)),
-            // Mean power of what is left, over that of noise: the geometric mean of the windows.
+            // Power of the residual over that of noise: geometric mean over the windows.
             of_evidence(|evidence| evidence.loss_per_dof.exp()),
             of_evidence(|evidence| evidence.loss_difference),
             of_evidence(|evidence| evidence.parameters_moved),

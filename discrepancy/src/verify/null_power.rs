@@ -80,19 +80,19 @@ impl NullPower {
         (null, of_noise)
     }
 
-    /// Mean and standard deviation of the joint power of synthetic records. Around a stop or a break-away even the true model
-    /// leaves more than noise, since start states are known to micrometres only.
+    /// Mean and standard deviation of the joint power of synthetic records. Around a stop or a break-away the residual of even
+    /// the true model is more than noise, since start states are known to micrometres only.
     fn of_records(&self, model: &Model<'_>) -> (f64, f64) {
         let outputs = model.windows.outputs.len();
         let sensitivities = model.windows.sensitivities();
-        let left = parallel::map_range(0..RECORDS, |draw| {
+        let powers = parallel::map_range(0..RECORDS, |draw| {
             let mut random = Pcg64::seed_from_u64(SEED ^ (DRAWS + draw) as u64);
             let windows = model.windows.redrawn(&model.simulated, &sensitivities, &mut random);
             let residual = windows.residual(&windows.simulate(&windows.rig));
             let power = Power::new(&sums(&residual, outputs), &self.expected, outputs);
             joint(&power.divided_by_levels(&levels(&power, self)))
         });
-        mean_and_sd(&left)
+        mean_and_sd(&powers)
     }
 }
 

@@ -92,31 +92,31 @@ impl Windows<'_> {
             return;
         }
         let rows = self.rows();
-        let mut left = self.raw_residual(&self.simulate(&self.rig));
+        let mut residual = self.raw_residual(&self.simulate(&self.rig));
         let mut shares = vec![1.0; self.starts.len()];
         for _ in 0..passes {
             let points = self.points.clone();
-            self.move_starts(&sensitivities(self), &left, &shares);
+            self.move_starts(&sensitivities(self), &residual, &shares);
             let new = self.raw_residual(&self.simulate(&self.rig));
-            let windows = left.chunks_exact_mut(rows).zip(new.chunks_exact(rows));
-            for ((left, new), (start, share)) in windows.zip(self.starts.iter().zip(&mut shares)) {
-                if dot(new, new) > dot(left, left) {
+            let windows = residual.chunks_exact_mut(rows).zip(new.chunks_exact(rows));
+            for ((residual, new), (start, share)) in windows.zip(self.starts.iter().zip(&mut shares)) {
+                if dot(new, new) > dot(residual, residual) {
                     self.points[start / WINDOW_PERIODS] = points[start / WINDOW_PERIODS];
                     *share *= SHORTER;
                 } else {
-                    left.copy_from_slice(new);
+                    residual.copy_from_slice(new);
                     *share = 1.0;
                 }
             }
         }
     }
 
-    /// Moves the start states by a fraction of the step, one for each window; `left` is the residual.
-    fn move_starts(&mut self, sensitivities: &[Vec<Vec<f64>>], left: &[f64], shares: &[f64]) {
+    /// Moves the start states by a fraction of the step, one for each window.
+    fn move_starts(&mut self, sensitivities: &[Vec<Vec<f64>>], residual: &[f64], shares: &[f64]) {
         let rows = self.rows();
         let measured: Vec<usize> = (0..2).filter(|axis| self.record.measured[*axis]).collect();
         for (at, columns) in sensitivities.iter().enumerate() {
-            let residual = &left[at * rows..][..rows];
+            let residual = &residual[at * rows..][..rows];
             let count = columns.len();
             // Prior precision, in units of the prior standard deviation.
             let mut matrix = DMatrix::<f64>::identity(count, count);

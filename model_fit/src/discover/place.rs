@@ -1,9 +1,9 @@
-//! Where what the model leaves comes from, whatever the suspects say: an unknown function of one or two variables at each place.
+//! Where the residual comes from, whatever the suspects say: an unknown function of one or two variables at each place.
 //!
 //! ```text
 //!   place p, variables x (and y):   x, |x|, x^2, x |x|, x^3, sign x     or   x y, x^2 y, x y^2     or a constant
 //!   g_k  = responses of all outputs to the coefficients of these at p, less what the model's own numbers can do
-//!   R^2  = share of what is left that the g_k of a group explain together
+//!   R^2  = share of the residual's power that the g_k of a group explain together
 //!   BIC gain = -n ln(1 - R^2) - k ln n        n independent samples, k functions
 //! ```
 //! The groups that lead are fitted in the simulator, and their share is what the fit took: a strong term is not linear in its
@@ -28,25 +28,25 @@ use model::{Model, Program};
 use serde::Serialize;
 use std::path::Path;
 
-/// Least share of what the model leaves that a place must explain to be said.
+/// Least share of the residual's power that a place must explain to be said.
 const LEAST_SHARE: f64 = 0.3;
-/// A further variable is said where what is left without it is larger by a factor of e to this; places whose rests differ by less
-/// than e to the second explain as much. Set on the first run of seed 2675484125523028 (tests/docs/model-study.md): 0.3 to 0.7
-/// and 0.03 to 0.2 said the variables of the same 52 or 53 of its 60 records.
+/// A further variable is said where the residual power without it is larger by a factor of e to this; places whose residual
+/// powers differ by less than e to the second explain as much. Set on the first run of seed 2675484125523028
+/// (tests/docs/model-study.md): 0.3 to 0.7 and 0.03 to 0.2 said the variables of the same 52 or 53 of its 60 records.
 const MORE: f64 = 0.5;
 const AS_MUCH: f64 = 0.05;
 /// Fewest and most groups that are fitted, as of the terms of a search, and steps of their fits.
 const FITTED: [usize; 2] = [4, 8];
 const STEPS: usize = 8;
 
-/// Where what the model leaves comes from.
+/// Where the residual comes from.
 #[derive(Clone, Debug, Serialize)]
 pub struct Located {
     /// As in `suspects`: the input, equation, definition or output.
     pub place: String,
     /// Variables that it depends on; none for a constant.
     pub variables: Vec<String>,
-    /// Share of what the model leaves that a function of these explains there, linearly.
+    /// Share of the residual's power that a function of these explains there, linearly.
     pub share: f64,
     /// Other places and variables that explain it as well.
     pub alternatives: Vec<Place>,
@@ -70,7 +70,7 @@ struct Group {
     rank: usize,
 }
 
-/// The place and the variables that explain most of what a fitted model leaves; `None` where none explains enough of it.
+/// The place and the variables that explain most of a fitted model's residual; `None` where none explains enough of it.
 pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
     let model = baseline.fitting.model;
     let terms = group_terms(model, &variables(baseline), period_s(&baseline.fitting));
@@ -91,7 +91,7 @@ pub(crate) fn located(baseline: &Fitted<'_>) -> Option<Located> {
         group.weigh(fit.map_or(group.share, |(share, _)| share), samples);
     }
     let most = |groups: &[Group]| groups.iter().map(|group| group.bic_gain).fold(f64::NEG_INFINITY, f64::max);
-    // What is left without the missing term may hang together over the whole record; what the best leaves does not.
+    // Without the missing term the residual may be correlated over the whole record; that of the best group is not.
     let best = most(&groups);
     let of_best = groups.iter().zip(&fits).filter(|(group, _)| group.bic_gain >= best);
     samples = of_best.filter_map(|(_, fit)| Some((*fit)?.1)).fold(samples, f64::max);
@@ -116,7 +116,7 @@ impl Group {
     }
 }
 
-/// Share of what is left that some terms explain, fitted together with all that the model leaves open from the coefficients of
+/// Share of the residual that some terms explain, fitted together with all that the model leaves open from the coefficients of
 /// the linear screening, and the effective sample size of the residual then; `None` where that cannot be simulated.
 fn refit(
     (with_terms, first): (&Model, usize),
@@ -195,8 +195,8 @@ fn period_s(fitting: &Fitting<'_>) -> f64 {
 }
 
 impl ModelReport {
-    /// Where what the model alone leaves comes from, for who reads what was named beside it: nothing where no more than noise is
-    /// left, or where a name says the same place. What a held-out record takes back says nothing.
+    /// Where the residual of the model alone comes from, for who reads what was named beside it: nothing where the residual is
+    /// noise, or where a name says the same place. What a held-out record takes back says nothing.
     #[must_use]
     pub fn located_in_words(&self) -> Option<String> {
         let located = self.located.as_ref()?;

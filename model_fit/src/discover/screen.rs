@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   r = measured less simulated     S = sensitivities to what is fitted     g = d outputs / d k at k = 0
-//!   all in units of what is left of each output
+//!   all in units of each output's residual
 //!   g' = g less what S can do for it          gain = (g' r)^2 / (g' g')          k = g' r / (g' g')
 //! ```
 //! All sums are kept for each block of time. Half of the blocks, drawn many times, say how often a term like the chosen one is
@@ -45,9 +45,9 @@ struct RowSums {
     /// Of sensitivities with terms.
     cross: DMatrix<f64>,
     squares: DVector<f64>,
-    /// Of sensitivities with what is left.
+    /// Of sensitivities with the residual.
     scores: DVector<f64>,
-    /// Of terms with what is left.
+    /// Of terms with the residual.
     term_scores: DVector<f64>,
 }
 
@@ -119,12 +119,12 @@ impl Screen {
         groups.iter().take(most).map(simplest).collect()
     }
 
-    /// Coefficient of a term that explains most of what is left.
+    /// Coefficient with which a term explains most of the residual.
     pub(super) fn coefficient_si(&self, term: usize) -> f64 {
         self.whole.coefficients_si[term]
     }
 
-    /// Share of what is left, beyond what the model's own numbers explain, that some terms explain together.
+    /// Share of the residual, beyond what the model's own numbers explain, that some terms explain together.
     pub(super) fn share(&self, terms: &[usize]) -> f64 {
         let (rest, residual) = (self.rest(self.terms.select_columns(terms)), self.projected_residual());
         let along = rest.tr_mul(&residual);
@@ -145,9 +145,9 @@ impl Screen {
     /// What terms do beyond the model's own numbers; 0 where that is nearly nothing.
     fn rest(&self, terms: DMatrix<f64>) -> DMatrix<f64> {
         let mut rest = self.project_off(terms.clone());
-        for (mut residual, whole) in rest.column_iter_mut().zip(terms.column_iter()) {
-            if residual.norm_squared() <= HIDDEN * whole.norm_squared() {
-                residual.fill(0.0);
+        for (mut projected, whole) in rest.column_iter_mut().zip(terms.column_iter()) {
+            if projected.norm_squared() <= HIDDEN * whole.norm_squared() {
+                projected.fill(0.0);
             }
         }
         rest
