@@ -33,7 +33,7 @@ impl Folder {
         inputs: impl IntoIterator<Item = &'a PathBuf>,
     ) -> Result<Self, FolderError> {
         fs::create_dir_all(path).map_err(|why| FolderError::Write { file: path.to_owned(), why })?;
-        // What is not there is missed by whoever reads it.
+        // Missing inputs are reported by their reader.
         let inputs = inputs.into_iter().filter_map(|file| fs::canonicalize(file).ok()).collect();
         Ok(Self { path: path.to_owned(), inputs })
     }

@@ -15,7 +15,7 @@ use crate::past::NONE;
 /// [`ExpressionError`] at the operator or function whose value is no finite number.
 pub fn constants(nodes: &Nodes) -> Result<Vec<Option<f64>>> {
     let mut values: Vec<Option<f64>> = Vec::new();
-    // What a node is made of stands before it.
+    // Operands precede their node.
     for node in nodes.all() {
         let of = |place: &u32| values[*place as usize];
         let value = match &node.kind {

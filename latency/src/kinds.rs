@@ -85,7 +85,7 @@ pub fn all() -> Vec<Kind> {
             });
         }
     }
-    // What is set beside each other stands beside each other.
+    // The reference follows the wake-up it is compared with.
     kinds.insert(1, reference);
     let after =
         kinds.iter().position(|kind| kind.tag == ROUND_TRIPS[0]).map_or(kinds.len(), |place| place + 1);

@@ -193,7 +193,7 @@ impl ForceChain {
             // The mean is of one movement: what was before it does not count.
             mean.velocity_m_per_s = velocity_m_per_s;
         }
-        // What is no number must not stay.
+        // A NaN would persist in the running mean: start anew.
         self.mean = (mean.force_n.is_finite() && mean.velocity_m_per_s.is_finite()).then_some(mean);
         let mean_n = mean.force_n;
         let lasting = |since: &mut Option<u64>, holds: bool| {

@@ -74,8 +74,8 @@ struct RestartConditions {
     by_person: bool,
 }
 
-/// What a state needs to know besides since when it lasts, which is noted as it is entered. Initial positioning to final settling
-/// are running; `since` is when the first sensors of this axis came.
+/// Data of a state beyond its entry time. Initial positioning to final settling are `Running`; `since` is when the first sensors
+/// of this axis came.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum State {
     WaitingForRig { since: Option<u64> },

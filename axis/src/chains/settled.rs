@@ -106,7 +106,7 @@ impl SettlingDetector {
         if bucket.number != number {
             *bucket = Bucket::empty(number);
         }
-        // What is no number must not hide: it makes the range endless.
+        // A non-finite position makes the range infinite, so the axis is not settled.
         let [low_m, high_m] = if position_m.is_finite() { [position_m; 2] } else { [f64::MIN, f64::MAX] };
         bucket.low_m = bucket.low_m.min(low_m);
         bucket.high_m = bucket.high_m.max(high_m);

@@ -22,7 +22,7 @@ const EXCESS_SCALE: f64 = 0.08;
 const VARIATION_SCALE: f64 = 0.1;
 /// Above so many times the smallest amplitude that is named, a larger one counts no more.
 const LARGEST_RATIO: f64 = 10.0;
-/// What effects count as whose amplitudes cannot be compared between windows: they vary by as much as their size.
+/// Amplitude variation assumed for effects whose amplitude cannot be estimated by window.
 const UNKNOWN_VARIATION: f64 = 1.0;
 /// Lower bound of the soft count of moved parameters, and the count at which its logarithm is 0.
 const SMALLEST_MOVED: f64 = 1e-3;
@@ -40,7 +40,7 @@ struct Weights {
     #[serde(rename = "behind")]
     loss_difference: f64,
     excess: f64,
-    /// What effects leave: the laws of a catalogue are never exact.
+    /// Of effects, on top of `excess`: the laws of a catalogue are never exact.
     excess_of_effects: f64,
     parameters_alone: f64,
     variation: f64,
