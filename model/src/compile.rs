@@ -384,7 +384,7 @@ impl<'a> Compiler<'a> {
         Ok(register)
     }
 
-    /// How much earlier: never later. A number whose range is its own bound, any other value counts as 0 where it is below.
+    /// Delay, clamped at 0. A parameter that may be negative is an error; one whose range is at least 0 needs no clamp.
     fn duration(&mut self, by: NodeId, scope: Scope) -> Result<Register, ExpressionError> {
         let model = self.model;
         let node = model.nodes.get(by);

@@ -167,7 +167,8 @@ impl Simulator<'_> {
         }
     }
 
-    /// What a step leads to, from the rates at its head. False where it reads itself and does not come to an end with that.
+    /// Tries a step from the rates at its head. False if the fixed-point iteration over delays shorter than the step does not
+    /// converge.
     pub(super) fn attempt(&mut self, inputs: &Inputs<'_>, (row, time_s): (usize, f64), step_s: f64) -> bool {
         if self.history.is_empty() {
             self.scheme(inputs, (row, time_s), step_s);
@@ -196,7 +197,7 @@ impl Simulator<'_> {
             let width = self.width();
             let moved = (0..self.largest.len()).map(|place| {
                 let change = (self.tried[place * width] - self.middle[place * width]).abs();
-                change / self.size(place, step_s)
+                change / self.error_scale(place, step_s)
             });
             if pass > 0 && moved.fold(0.0, f64::max) <= enough {
                 return true;

@@ -25,7 +25,7 @@ use crate::inputs::Inputs;
 
 /// Results of the guards' tape for each friction.
 const GUARDS: usize = 3;
-/// Shares of a step at which conditions are looked at: a speed may touch 0 and come back.
+/// Shares of a step at which event functions are evaluated: a speed may touch 0 and come back.
 const LOOKED_AT: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 /// Halvings of a step in the search of an instant, which then is good to 1e-12 of it.
 const HALVINGS: usize = 40;
@@ -33,7 +33,7 @@ const HALVINGS: usize = 40;
 const CORRECTIONS: usize = 3;
 /// A correction of an instant that is not worth another step, over the step that was tried.
 const CORRECTED: f64 = 1e-9;
-/// Share of a step over which the change of a condition is computed by central differences.
+/// Share of a step over which the rate of an event function is computed by central differences.
 const DIFFERENCE: f64 = 1e-3;
 
 /// A friction that stops or breaks away within a step.
@@ -101,7 +101,8 @@ impl Simulator<'_> {
         Ok(())
     }
 
-    /// What holds at a sample and no longer does, since an input jumped there. A speed that is held has no derivative.
+    /// Re-evaluates stuck frictions after an input jump at a sample, or after a step that renewed memories. A speed that is held
+    /// has no derivative.
     pub(super) fn release(&mut self, inputs: &Inputs<'_>, instant: (usize, f64)) {
         let width = self.width();
         for friction in 0..self.direction.len() {
@@ -115,8 +116,8 @@ impl Simulator<'_> {
         }
     }
 
-    /// What is below 0 where a friction no longer slides in its direction, or no longer holds, at the states in `within`.
-    fn condition(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), friction: usize) -> f64 {
+    /// Event function: negative once the friction leaves its mode (sliding direction, or stick), at the states in `within`.
+    fn event_function(&mut self, inputs: &Inputs<'_>, instant: (usize, f64), friction: usize) -> f64 {
         let direction = self.direction[friction];
         if direction != 0.0 {
             return direction * self.within[self.program.held[friction].0];
@@ -149,7 +150,7 @@ impl Simulator<'_> {
             let mut found = None;
             for share in LOOKED_AT {
                 self.interpolate(step_s, share);
-                if self.condition(inputs, (row, time_s + share * step_s), friction) < 0.0 {
+                if self.event_function(inputs, (row, time_s + share * step_s), friction) < 0.0 {
                     found = Some(share);
                     break;
                 }
@@ -159,7 +160,7 @@ impl Simulator<'_> {
             for _ in 0..HALVINGS {
                 let middle = 0.5 * (before + behind);
                 self.interpolate(step_s, middle);
-                if self.condition(inputs, (row, time_s + middle * step_s), friction) >= 0.0 {
+                if self.event_function(inputs, (row, time_s + middle * step_s), friction) >= 0.0 {
                     before = middle;
                 } else {
                     behind = middle;
@@ -172,8 +173,8 @@ impl Simulator<'_> {
         first
     }
 
-    /// The condition at the end of what was tried, and its rate of change along the motion there.
-    fn condition_and_rate(
+    /// The event function at the end of the step that was tried, and its rate of change along the motion there.
+    fn event_function_and_rate(
         &mut self,
         inputs: &Inputs<'_>,
         (row, time_s): (usize, f64),
@@ -186,7 +187,7 @@ impl Simulator<'_> {
             for (place, within) in self.within.iter_mut().enumerate() {
                 *within = self.tried[place * width] + share * step_s * self.stages[STAGES - 1][place * width];
             }
-            self.condition(inputs, (row, time_s + length_s + share * step_s), friction)
+            self.event_function(inputs, (row, time_s + length_s + share * step_s), friction)
         });
         [at, (ahead - behind) / (2.0 * DIFFERENCE * step_s)]
     }
@@ -203,7 +204,7 @@ impl Simulator<'_> {
         let mut rate = 0.0;
         for correction in 0..=CORRECTIONS {
             self.attempt(inputs, (row, time_s), length_s);
-            let found = self.condition_and_rate(inputs, (row, time_s), [length_s, step_s], friction);
+            let found = self.event_function_and_rate(inputs, (row, time_s), [length_s, step_s], friction);
             rate = found[1];
             let late_s = found[0] / rate;
             let is_better = late_s.abs() > CORRECTED * step_s && late_s.abs() < 0.5 * length_s;
@@ -218,7 +219,7 @@ impl Simulator<'_> {
         let instant = (row, time_s + length_s);
         let width = self.width();
         let place = self.program.held[friction].0;
-        // How the condition depends on what is fitted.
+        // Sensitivity of the event's instant to what is fitted.
         let direction = self.direction[friction];
         if direction == 0.0 {
             put(self.program, &mut self.guards, inputs, instant, &self.x);

@@ -128,7 +128,7 @@ impl Simulator<'_> {
             let at_end = self.stages[END][index] - self.stages[STAGES - 1][index];
             if index % width == 0 {
                 let error = step_s * (2.0 * in_middle - at_end) / 3.0;
-                worst = worst.max(error.abs() / self.size(index / width, step_s));
+                worst = worst.max(error.abs() / self.error_scale(index / width, step_s));
             }
             self.tried[index] += step_s / 6.0 * (4.0 * in_middle + at_end);
         }
@@ -136,7 +136,7 @@ impl Simulator<'_> {
         for index in 0..self.tried.len() {
             let moved = step_s / 3.0 * (self.stages[MOVED][index] - self.stages[END][index]);
             if index % width == 0 {
-                worst = worst.max(moved.abs() / self.size(index / width, step_s));
+                worst = worst.max(moved.abs() / self.error_scale(index / width, step_s));
             }
             self.tried[index] += moved;
         }

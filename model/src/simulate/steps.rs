@@ -233,14 +233,14 @@ impl Simulator<'_> {
         Err(Failure::Steps { time_s: from_s })
     }
 
-    /// Largest error of a step over the size of its state.
+    /// Largest error of a step over the scale of its state.
     fn error(&self, step_s: f64) -> f64 {
         let width = self.width();
         let mut worst: f64 = 0.0;
         for place in 0..self.largest.len() {
             let at = place * width;
             let error: f64 = E.iter().zip(&self.stages).map(|(weight, stage)| weight * stage[at]).sum();
-            let relative = (step_s * error).abs() / self.size(place, step_s);
+            let relative = (step_s * error).abs() / self.error_scale(place, step_s);
             worst = if relative.is_nan() { f64::INFINITY } else { worst.max(relative) };
             if worst.is_infinite() {
                 return worst;
@@ -249,9 +249,9 @@ impl Simulator<'_> {
         worst
     }
 
-    /// What the error of a state in the step that was tried is compared with. A state that has not moved yet is as large as its
-    /// first step.
-    pub(super) fn size(&self, place: usize, step_s: f64) -> f64 {
+    /// Scale of a state for the step-size control: its largest size so far, or its change in the step that was tried where that
+    /// is more.
+    pub(super) fn error_scale(&self, place: usize, step_s: f64) -> f64 {
         let at = place * self.width();
         let moved = (step_s * self.stages[0][at]).abs().max((self.tried[at] - self.x[at]).abs());
         self.largest[place].max(moved).max(f64::MIN_POSITIVE)
