@@ -387,7 +387,7 @@ impl<'a> Fitting<'a> {
                 let residual = measured - value;
                 normal.squares += residual * residual;
                 for (i, place) in mine.iter().enumerate() {
-                    normal.score[*place] += slope[i] * residual;
+                    normal.right_side[*place] += slope[i] * residual;
                     for (j, other) in mine.iter().enumerate().take(i + 1) {
                         normal.matrix[(*place, *other)] += slope[i] * slope[j];
                     }
@@ -413,7 +413,7 @@ impl<'a> Fitting<'a> {
         for (place, unknown) in self.unknowns.iter().enumerate() {
             if let Some([expected, tolerance]) = unknown.prior_si {
                 sum.matrix[(place, place)] += tolerance.powi(-2);
-                sum.score[place] += (expected - point.values_si[place]) / tolerance.powi(2);
+                sum.right_side[place] += (expected - point.values_si[place]) / tolerance.powi(2);
             }
         }
         sum
@@ -437,7 +437,7 @@ impl<'a> Fitting<'a> {
         Ok(Estimator::new(options).descend(start, |estimator, point| {
             let Ok(normals) = here.normals(&point.values_si, &cut) else { return Step::Impossible };
             let sum = here.sum(&normals, point);
-            let predicted_reduction = sum.score.dot(&here.step(&sum, &point.values_si, 0.0));
+            let predicted_reduction = sum.right_side.dot(&here.step(&sum, &point.values_si, 0.0));
             match here.best_step(estimator, point, &sum, predicted_reduction) {
                 Some(best) => Step::Accepted(best),
                 None => Step::Refused { predicted_reduction },

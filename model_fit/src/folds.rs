@@ -35,7 +35,7 @@ pub(super) fn steps(
         for (output, normal) in block.iter().enumerate() {
             let weight = 1.0 / fitting.variance(output, point.squares[output]);
             rest.matrix -= &normal.matrix * weight;
-            rest.score -= &normal.score * weight;
+            rest.right_side -= &normal.right_side * weight;
         }
         let shared = within(
             &rest,
@@ -67,8 +67,8 @@ fn within(
         is_free[place] = ends(place).iter().all(|end| *end != 0.0);
     }
     loop {
-        let score = &normal.score - &normal.matrix * &held;
-        let rest = Normal { score, ..normal.clone() };
+        let right_side = &normal.right_side - &normal.matrix * &held;
+        let rest = Normal { right_side, ..normal.clone() };
         let step = solved(&rest, &is_free, 0.0);
         let leaves = (0..is_free.len()).filter(|place| is_free[*place]).find(|place| {
             let [least, most] = ends(*place);
@@ -86,7 +86,7 @@ pub(super) fn folds(normals: &[Vec<Normal>], steps: &[DVector<f64>]) -> Folds {
     let of_block = |(block, step): (&Vec<Normal>, &DVector<f64>)| {
         let squares = |normal: &Normal| {
             let quadratic = step.dot(&(&normal.matrix * step));
-            (normal.squares - 2.0 * step.dot(&normal.score) + quadratic).max(0.0)
+            (normal.squares - 2.0 * step.dot(&normal.right_side) + quadratic).max(0.0)
         };
         block.iter().map(squares).collect()
     };

@@ -301,7 +301,7 @@ fn scale(fitting: &Fitting<'_>, point: &Point) -> Vec<f64> {
 
 /// Coefficients of the columns that come nearest to a change.
 pub(super) fn projected(columns: &DMatrix<f64>, change: &DVector<f64>) -> DVector<f64> {
-    let normal = Normal { matrix: columns.tr_mul(columns), score: columns.tr_mul(change), squares: 0.0 };
+    let normal = Normal { matrix: columns.tr_mul(columns), right_side: columns.tr_mul(change), squares: 0.0 };
     solved(&normal, &vec![true; columns.ncols()], 0.0)
 }
 
