@@ -13,7 +13,8 @@
 //! all sets that were fitted then decide what is named ([`decision`]); where none reaches one half, the selection stands.
 //! What is to be named has to gain more than chance gives, its best windows aside (`name/significance.rs`).
 //!
-//! The loss of a fit is the penalised loss J here (`FittedModel::loss`), that of windows the loss L (`fit.rs`).
+//! Fits that are compared have the penalised loss J (`FittedModel::loss` of `refit` and `fit_all`), the reported model L and
+//! priors alone (`fit_selected`, `fit_for_comparison`); L is the loss of the windows (`fit.rs`).
 //!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
@@ -337,7 +338,8 @@ fn lacks_fit_on_an_axis(engine: &Engine<'_>, model: &FittedModel) -> bool {
     engine.axis_by_axis && (lacks_on([true, false]) || lacks_on([false, true]))
 }
 
-/// Penalised loss J over the degrees of freedom of all windows above which a model leaves more than noise.
+/// Bound on J/f of all windows, and on L/f of an axis, above which a model lacks fit; on the held-out record on the logarithm of
+/// chi2 over the middle of its null range (`verify::lacks_fit`).
 pub(crate) fn lack_of_fit_per_dof(linked: bool) -> f64 {
     if linked { LACK_OF_FIT_PER_DOF_LINKED } else { LACK_OF_FIT_PER_DOF }
 }

@@ -46,8 +46,9 @@ pub struct FittedModel {
     pub effects: Vec<EffectEstimate>,
     /// Factors of the baseline parameters, in the order of [`PARAMETERS`]; 1 is the rig file's value.
     pub factors: [f64; COUNT],
-    /// The penalised loss J of fits that are compared: loss L of the windows, priors, and a penalty for each number of an effect
-    /// and each parameter that is off. Of a reported model (`name::gauss_newton::fit_selected`) L and priors alone.
+    /// Of `refit` and `name::gauss_newton::fit_all` the penalised loss J: loss L of the windows, priors, and a penalty for each
+    /// number of an effect and each parameter that is off. Of `fit_selected` and `fit_for_comparison` there, which return the
+    /// reported model, L and priors alone. Beside tables L, priors and the penalty for points (`tabulate`).
     pub loss: f64,
     /// Squared residuals of each window.
     pub(crate) squares: Vec<f64>,

@@ -41,7 +41,7 @@ const MAX_KNOTS: usize = tabulated::POINTS[1];
 /// Steps of a first fit, and of a final one.
 const FIRST_STEPS: usize = 2;
 const STEPS: usize = 5;
-/// Share of the penalised loss that a table must remove, and a second one of what remains of it.
+/// Share of the loss (L, priors and the penalty for points) that a table must remove, and a second one of the remaining loss.
 const LEAST_SHARE: f64 = 0.05;
 const LEAST_SHARE_OF_SECOND: f64 = 0.15;
 
@@ -50,7 +50,7 @@ pub(crate) struct Tables {
     pub(crate) terms: Vec<TableTerm>,
     /// Parameters that are off beside them.
     pub(crate) parameters: Vec<Quantity>,
-    /// Share of the calibration loss that the tables remove, at most 1.
+    /// Share of the loss under the parameters alone that the tables remove, at most 1.
     pub(crate) share_explained: f64,
 }
 

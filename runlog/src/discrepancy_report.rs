@@ -98,7 +98,7 @@ pub struct Report {
     #[serde(default)]
     pub not_excited: Vec<EffectPlace>,
     /// Amplitude of each other effect at which the expected linear gain reaches the threshold: found in about half of the records
-    /// or fewer, since the penalties in J are ignored.
+    /// or fewer, since the penalties of the penalised loss are ignored.
     #[serde(skip_deserializing)]
     pub detection_limits: Vec<DetectionLimit>,
     /// Where model and records disagree.

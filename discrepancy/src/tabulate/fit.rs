@@ -157,8 +157,8 @@ impl Model {
         }
     }
 
-    /// Priors of the factors and of the values, and the penalty for the points.
-    fn penalty(&self) -> f64 {
+    /// Priors of the factors and of the values, and the penalty for the points; no penalty for parameters off the file, as J has.
+    fn priors_and_penalty(&self) -> f64 {
         let factors = (0..COUNT).map(Coordinate::Factor);
         let values = self.coordinates().into_iter().filter(|one| matches!(one, Coordinate::Value(..)));
         let prior = factors.chain(values).map(|one| self.precision(one) * self.deviation(one).powi(2));
@@ -177,7 +177,7 @@ impl Model {
 pub(super) struct Iterate {
     pub(super) model: Model,
     residual: Vec<f64>,
-    /// Penalised loss: of the windows, with priors and the penalty for the points.
+    /// L, priors and the penalty for the points.
     pub(super) loss: f64,
 }
 
@@ -198,7 +198,7 @@ impl Iterate {
     /// `None` where no rig can have the model.
     pub(super) fn of(engine: &Engine<'_>, model: Model) -> Option<Self> {
         let residual = engine.residual(&engine.simulate(&model.rig(engine)?));
-        let loss = loss(&engine.squares(&residual), &engine.scaled_dof) + model.penalty();
+        let loss = loss(&engine.squares(&residual), &engine.scaled_dof) + model.priors_and_penalty();
         loss.is_finite().then_some(Iterate { model, residual, loss })
     }
 
@@ -312,7 +312,7 @@ impl TableLinearisation {
         products.cross_validated_loss(&(0..coordinates.len()).collect::<Vec<_>>(), &precisions, &from, FOLDS)
     }
 
-    /// Predicted penalised loss of the linearised model with further tables.
+    /// Predicted loss of the linearised model with further tables: L, priors and the penalty for the points.
     pub(super) fn predicted_loss(
         &self,
         engine: &Engine<'_>,
