@@ -1,7 +1,7 @@
 //! Where the baseline and the records disagree: unknown inputs of every balance, window by window.
 //!
 //! ```text
-//!   record ──► windows of 20 ms ──► unknown force, flows, sensor offset ──► bars, regimes, maps, series
+//!   record ──► short windows of 20 ms ──► unknown force, flows, sensor offset ──► bars, regimes, maps, series
 //! ```
 //!
 //! A balance is closed when its unknown input is as large as its propagated noise. Otherwise a term is missing, and its
@@ -24,7 +24,7 @@ use estimate::{Unknowns, estimate};
 use plant::{Axis, PERIOD_S, RigParameters};
 use regime::{REGIMES, Regimes};
 
-/// Periods of a window here, shorter than one of the fits ([`crate::windows::WINDOW_PERIODS`]).
+/// Periods of a short window; those of the fits are longer ([`crate::windows::WINDOW_PERIODS`]).
 pub(crate) const SHORT_WINDOW_PERIODS: usize = 20;
 /// What an unknown input may depend on.
 pub const VARIABLES: [WindowVariable; 19] = [
@@ -94,14 +94,14 @@ pub struct UnknownSeries {
     pub balance: String,
     /// N or Nl/min.
     pub(crate) unit: &'static str,
-    /// Windows in which it is observable, in the order of the records.
+    /// Short windows in which it is observable, in the order of the records.
     pub points: Vec<UnknownPoint>,
 }
 
-/// Unknown input of a balance in one window.
+/// Unknown input of a balance in one short window.
 #[derive(Clone, Copy, Debug)]
 pub struct UnknownPoint {
-    /// Index of its window of 20 ms in the record.
+    /// Index of its short window in the record.
     pub(crate) window: usize,
     /// Estimate, in the series' unit; positive along the extension of the axis, or into the chamber.
     pub(crate) value: f64,

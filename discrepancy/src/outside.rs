@@ -39,8 +39,8 @@ const MIN_MEAN_Z: f64 = 6.0;
 pub(crate) const CONSTANT: &str = "constant";
 /// Variables of a located term that come first.
 const LOCATED: usize = 2;
-/// Fewest windows of a balance.
-const MIN_WINDOWS: usize = 100;
+/// Fewest short windows of a balance.
+const MIN_SHORT_WINDOWS: usize = 100;
 
 struct BalanceTests<'a> {
     series: &'a UnknownSeries,
@@ -57,7 +57,7 @@ pub fn outside(
     progress: &mut dyn FnMut(&str),
 ) -> Option<UncataloguedTerm> {
     let mut best: Option<(f64, BalanceTests<'_>)> = None;
-    for series in unknowns.iter().filter(|series| series.points.len() >= MIN_WINDOWS) {
+    for series in unknowns.iter().filter(|series| series.points.len() >= MIN_SHORT_WINDOWS) {
         progress(&format!("outside: {}", series.balance));
         let sample = Sample::of(series);
         let tests: Vec<_> = (0..VARIABLES.len()).map(|variable| sample.test(variable)).collect();

@@ -5,9 +5,9 @@
 //!   `outside`      (of a flow: into a, into b, into both)           from the curve   └──► second variable?
 //! ```
 //!
-//! The curve of an unknown input is shrunk by its prior, comes from independent windows of 20 ms, and parameters have absorbed a
-//! part of it. It only starts the fit. The loss, the windows and the penalty for each number are those of naming. A table is
-//! not added if it lowers the training loss, or the five-fold cross-validated loss of the linearised model, by less than
+//! The curve of an unknown input is shrunk by its prior, comes from independent short windows of 20 ms, and parameters have
+//! absorbed a part of it. It only starts the fit. The loss, the windows and the penalty for each number are those of naming. A
+//! table is not added if it lowers the training loss, or the five-fold cross-validated loss of the linearised model, by less than
 //! [`LEAST_SHARE`].
 //!
 //! The parameters that were off in the calibration are fitted jointly. In the end all return to the rig file's values, and

@@ -100,7 +100,7 @@ fn parameters_that_absorb_a_missing_law_disagree_between_windows_and_one_that_is
     let absorbing = alone(&hiding(&[("friction-asymmetry", "drive", &[("asymmetry_percent", 30.0)])]));
     let moved = absorbing.reported.factors.iter().zip(absorbing.parameter_tau);
     let disagree =
-        moved.filter(|(factor, spread)| **factor != 1.0 && *spread > 0.3 * (**factor - 1.0).abs()).count();
+        moved.filter(|(factor, tau)| **factor != 1.0 && *tau > 0.3 * (**factor - 1.0).abs()).count();
     let mut factors = [1.0; COUNT];
     factors[0] = 1.03;
     let off = alone(&with_factors(&baseline, &factors));

@@ -234,7 +234,7 @@ fn without_effect(fitting: &Fitting<'_>, suspect: usize, first: &[f64], loss: f6
     candidates.into_iter().find(is_as_low)
 }
 
-/// Every value of the newest suspect in the file beside the other numbers.
+/// Each combination of values that the file gives the newest suspect, at most [`MOST`]; the other numbers as in `first`.
 fn values_of_newest(fitting: &Fitting<'_>, suspects: &[usize], first: Vec<f64>) -> Vec<Vec<f64>> {
     let mut all = vec![first];
     let Some(newest) = suspects.last() else { return all };

@@ -28,7 +28,7 @@ const FEWEST: usize = 300;
 const CLEARLY: f64 = 0.6;
 /// Correlation from which a balance holds.
 const HOLDS: f64 = 0.4;
-/// Least spread of the force, in specified noise, for a test of its sign.
+/// Least standard deviation of the expected force, in specified noise, for a test of the sensor's sign.
 const FORCE_SHOWS: f64 = 4.0;
 /// Units of force, N each.
 const FORCES: [(&str, f64); 4] = [("kN", 1e3), ("mN", 1e-3), ("kgf", 9.80665), ("lbf", 4.448_222)];
@@ -269,11 +269,11 @@ fn forces(motion: &Motion, rig: &RigParameters, axis: Axis, period_s: f64) -> Op
     let sensor: Vec<_> = rows.iter().map(|row| (row.0, row.3, row.2)).collect();
     let of_needed: Vec<_> = rows.iter().map(|row| (row.0, row.3, row.1)).collect();
     let slopes = [&of_needed, &sensor].map(|pairs| Pairs::of(pairs).map_or(0.0, |pairs| pairs.slope()));
-    let left: Vec<_> = rows
+    let residuals: Vec<_> = rows
         .iter()
         .map(|(place, needed, gas, force)| (*place, needed - slopes[0] * force, gas - slopes[1] * force))
         .collect();
-    Pairs::of(&left)
+    Pairs::of(&residuals)
 }
 
 /// Sign and unit of the force sensor.
@@ -304,8 +304,8 @@ fn force_sign(notes: &mut Notes, rig: &RigParameters, grid: &Grid, axis: Axis, m
         })
         .collect();
     let Some(pairs) = Pairs::of(&pairs) else { return };
-    let spread = (pairs.products[0] / force.len() as f64).sqrt();
-    if spread < FORCE_SHOWS * rig.sensors().force_noise_n || pairs.correlation().abs() < HOLDS {
+    let expected_std_n = (pairs.products[0] / force.len() as f64).sqrt();
+    if expected_std_n < FORCE_SHOWS * rig.sensors().force_noise_n || pairs.correlation().abs() < HOLDS {
         return;
     }
     let channel = Channel::Of(axis, Signal::Force);

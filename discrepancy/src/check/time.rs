@@ -213,24 +213,24 @@ fn lost(notes: &mut Notes, period_s: f64) {
     }
 }
 
-/// Spread of the sampling instants.
+/// Standard deviation of the sampling instants.
 fn jitter(notes: &mut Notes, period_s: f64) {
     let times = notes.record.time_s();
-    // Half the spread between the 16 % and 84 % quantiles is a standard deviation; that of a difference has two instants in it.
+    // Half the distance between the 16 % and 84 % quantiles is a standard deviation; that of a difference has two instants in it.
     let mut steps: Vec<f64> = times
         .windows(2)
         .map(|pair| (pair[1] - pair[0]) / period_s)
         .filter(|step| (0.0..1.7).contains(step))
         .collect();
     let [Some(low), Some(high)] = [quantile(&mut steps, 0.16), quantile(&mut steps, 0.84)] else { return };
-    let spread = 0.5 * (high - low) / std::f64::consts::SQRT_2;
-    let jitter_ms = 1e3 * spread * period_s;
-    if spread > JITTER[1] {
+    let std_periods = 0.5 * (high - low) / std::f64::consts::SQRT_2;
+    let jitter_ms = 1e3 * std_periods * period_s;
+    if std_periods > JITTER[1] {
         let text = format!(
             "the rows come irregularly, by {jitter_ms:.3} ms rms: speeds taken from them are as uncertain"
         );
         notes.add_time("irregular-sampling", Some(0), false, &text);
-    } else if spread > JITTER[0] {
+    } else if std_periods > JITTER[0] {
         notes.add_time(
             "jitter",
             Some(0),

@@ -375,7 +375,7 @@ impl Equations {
     }
 }
 
-/// Appends the unknown inputs of the windows of an axis.
+/// Appends the unknown inputs of the short windows of an axis.
 fn gather(
     rig: &RigParameters,
     gridded: &GriddedRecord,

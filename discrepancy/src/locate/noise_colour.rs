@@ -12,7 +12,7 @@
 use super::SHORT_WINDOW_PERIODS;
 use crate::gridded_record::{CHANNELS, GriddedRecord};
 
-/// Fewest resting windows.
+/// Fewest resting short windows.
 const LEAST: usize = 15;
 /// Threshold of white noise: three standard errors of an estimate from a second.
 const WHITE: f64 = 0.15;

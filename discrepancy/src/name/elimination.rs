@@ -13,7 +13,8 @@ const SWAPPED: usize = 3;
 /// one of two better by more in one record of 700 at most, if both have the same number of effect parameters; each further
 /// parameter shifts the difference by [`super::EFFECT_PARAMETER_PENALTY`].
 pub(crate) const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;
-/// The same as a share of the gain, or of the remaining loss if that is less: model error may decide between two fits.
+/// The same as a share of the fall of J since calibration, or of the remaining J if that is less: model error may decide between
+/// two fits.
 const INDISTINGUISHABLE_LOSS_SHARE: f64 = 0.02;
 /// Multiple of the null threshold required of each effect while others remain, since no model is exact.
 const THRESHOLD_FACTOR_SEVERAL: f64 = 3.0;

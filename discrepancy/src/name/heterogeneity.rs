@@ -132,7 +132,7 @@ pub(super) fn heterogeneity(
             let columns = column..column + effect.coordinates.len();
             column = columns.end;
             let scale = windows.with_response(engine, model, at, columns.start + leading_key(effect))?;
-            let variation = between_window_sd(&informative(&scale));
+            let variation = tau(&informative(&scale));
             let tau = columns.map(|column| Some(significant_tau(&windows.changes(column)?)));
             Some(Heterogeneity { variation, tau: tau.collect::<Option<_>>()? })
         })
@@ -213,11 +213,7 @@ fn significant_tau(changes: &[(f64, f64)]) -> f64 {
     informative.sort_by(|left, right| part(left).total_cmp(&part(right)));
     informative.truncate(informative.len() - (MAX_OUTLIER_SHARE * informative.len() as f64) as usize);
     let dof = informative.len() as f64 - 1.0;
-    if dof >= 1.0 && cochran_q(&informative) * (1.0 - HIGH_I2) > dof {
-        between_window_sd(&informative)
-    } else {
-        0.0
-    }
+    if dof >= 1.0 && cochran_q(&informative) * (1.0 - HIGH_I2) > dof { tau(&informative) } else { 0.0 }
 }
 
 /// The windows that say something: the others would count as windows that agree.
@@ -238,15 +234,15 @@ fn mean_of(changes: &[(f64, f64)]) -> f64 {
     changes.iter().map(|(change, information)| change * information).sum::<f64>() / total
 }
 
-/// tau of the changes that windows ask for, each with its information.
-fn between_window_sd(changes: &[(f64, f64)]) -> f64 {
+/// tau, the standard deviation between windows of the changes that they ask for, each with its information: method of moments.
+fn tau(changes: &[(f64, f64)]) -> f64 {
     let total: f64 = changes.iter().map(|(_, information)| information).sum();
     let squares: f64 = changes.iter().map(|(_, information)| information * information).sum();
-    let spare = total - squares / total;
-    if spare <= 0.0 {
+    let denominator = total - squares / total;
+    if denominator <= 0.0 {
         return 0.0;
     }
-    let variance = (cochran_q(changes) - (changes.len() as f64 - 1.0)) / spare;
+    let variance = (cochran_q(changes) - (changes.len() as f64 - 1.0)) / denominator;
     variance.max(0.0).sqrt()
 }
 
@@ -259,7 +255,7 @@ mod tests {
         let changes: Vec<(f64, f64)> =
             (0..20).map(|window| (if window % 2 == 0 { 0.1 } else { -0.1 }, 100.0)).collect();
         // Q = 20 of 19 expected.
-        let small = between_window_sd(&changes);
+        let small = tau(&changes);
         assert!(small < 0.03, "{small}");
         assert_eq!(significant_tau(&changes), 0.0);
     }

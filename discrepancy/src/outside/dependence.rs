@@ -16,7 +16,7 @@ use model_fit::stats::mean_and_variance;
 
 /// Circular shifts.
 pub(crate) const SHIFTS: usize = 200;
-/// Windows of a block of a fold: 0.2 s, so that both folds see each stroke in all its parts.
+/// Short windows of a block of a fold: 0.2 s, so that both folds see each stroke in all its parts.
 const BLOCK_SHORT_WINDOWS: usize = 10;
 /// Bins to each side of a pair.
 const PAIR_BINS: usize = 6;
@@ -30,7 +30,7 @@ pub(crate) struct Sample {
     folds: Vec<usize>,
 }
 
-/// The bin of each window.
+/// The bin of each short window.
 #[derive(Clone, Debug)]
 pub(crate) struct Bins {
     bin_index: Vec<usize>,
@@ -43,7 +43,7 @@ impl Bins {
         Bins { bin_index: bins(&values), count: BINS }
     }
 
-    /// Bins of equal width, which isolate a pulse of few windows.
+    /// Bins of equal width, which isolate a pulse of few short windows.
     pub(crate) fn even(sample: &Sample, variable: usize) -> Self {
         let values = || sample.variables.iter().map(|variables| variables[variable]);
         let least = values().fold(f64::INFINITY, f64::min);
@@ -102,7 +102,7 @@ impl Sample {
         (r2, (1 + reached) as f64 / (1 + SHIFTS) as f64, shift_z)
     }
 
-    /// Cross-validated R2 of bin means, with the input shifted by some windows.
+    /// Cross-validated R2 of bin means, with the input shifted by some short windows.
     pub(crate) fn explained(&self, bins: &Bins, shift: usize) -> f64 {
         let n = self.values.len();
         let from = |at: usize| (at + shift) % n;

@@ -82,7 +82,7 @@ pub struct LocatedTerm {
 pub struct LocatedVariable {
     /// As in [`Dependence::variable`].
     pub variable: String,
-    /// Log evidence of a term over this variable against none; null for linked rods, where windows of 20 ms decide.
+    /// Log evidence of a term over this variable against none; null for linked rods, where short windows of 20 ms decide.
     #[serde(skip_deserializing)]
     pub log_evidence: Option<f64>,
     /// Share of the explained loss, or of the variance of the unknown input on folds it was not fitted on.

@@ -27,7 +27,7 @@ const CHANGE: f64 = 0.01;
 /// Most iterations; decrease of the squares at convergence, as a share of the squared signature; and longest step of a
 /// coordinate.
 const STEPS: usize = 12;
-const CONVERGED: f64 = 1e-7;
+const RELATIVE_TOLERANCE: f64 = 1e-7;
 const LONGEST: f64 = 0.3;
 /// Largest residual of an effect of the catalogue's form, as a share of its squared signature, and largest relative error of a
 /// number, for the fit to count as faithful.
@@ -44,7 +44,7 @@ const MOST_OFF: f64 = 0.15;
 pub(crate) struct NearestLaw {
     /// One for each key of the sheet, in its unit.
     pub(crate) numbers: Vec<f64>,
-    /// Share of the form's squared signature that the fit leaves.
+    /// Residual squares of the fit over the form's squared signature.
     pub(crate) left_share: f64,
 }
 
@@ -148,9 +148,9 @@ impl Fit<'_> {
         if at < self.keys() { self.candidate.fit_bounds(at) } else { [-MOST_OFF, MOST_OFF] }
     }
 
-    /// Least squares from a start; converged when the decrease is below a share of `whole`.
+    /// Least squares from a starting point; converged when the decrease is below a share of `whole`.
     pub(crate) fn nearest(&self, start: FitPoint, whole: f64) -> FitPoint {
-        let options = Options { steps: STEPS, absolute_tolerance: CONVERGED * whole, ..JOINT };
+        let options = Options { steps: STEPS, absolute_tolerance: RELATIVE_TOLERANCE * whole, ..JOINT };
         let (fitted, _) = Estimator::new(options).descend(start, |estimator, point| {
             let Some(step) = self.step(&point.coordinates, &point.run, &point.residual) else {
                 return Step::Impossible;
