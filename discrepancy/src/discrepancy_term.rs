@@ -93,8 +93,8 @@ struct Group {
     kinds: &'static [UnknownKind],
     regressor: Regressor,
     log_evidence: f64,
-    /// Reduction of the loss at the best size.
-    loss_reduction: f64,
+    /// Fall of the loss at the best size.
+    gain: f64,
 }
 
 /// The model to which a term is added.
@@ -139,7 +139,7 @@ pub fn located_term(engine: &Engine<'_>, reference: &ReferenceModel<'_>) -> Opti
             groups.insert(usize::from(ratio <= SIMPLER), constant);
         }
     }
-    let total = groups.iter().map(|group| group.loss_reduction).fold(best.loss_reduction, f64::max).max(1e-9);
+    let total = groups.iter().map(|group| group.gain).fold(best.gain, f64::max).max(1e-9);
     let mut variables: Vec<LocatedVariable> = Vec::new();
     let of_balance = groups.iter().filter(|group| group.axis == best.axis && group.kinds == best.kinds);
     for group in of_balance.filter(|group| group.log_evidence > 0.0) {
@@ -148,7 +148,7 @@ pub fn located_term(engine: &Engine<'_>, reference: &ReferenceModel<'_>) -> Opti
                 variables.push(LocatedVariable {
                     variable: name.to_owned(),
                     log_evidence: Some(group.log_evidence),
-                    share: (group.loss_reduction / total).clamp(0.0, 1.0),
+                    share: (group.gain / total).clamp(0.0, 1.0),
                 });
             }
         }
@@ -227,7 +227,7 @@ impl Term {
                 let prior_log_determinant = -(count as f64) * precision.ln();
                 let log_evidence =
                     -0.5 * (with - loss + prior_log_determinant + with_determinant - log_determinant);
-                Group { axis, kinds, regressor, log_evidence, loss_reduction: loss - with }
+                Group { axis, kinds, regressor, log_evidence, gain: loss - with }
             };
             SIZES
                 .into_iter()
@@ -384,7 +384,7 @@ mod tests {
         let place = |name: &str| VARIABLES.iter().position(|known| known.name == name).expect("in the table");
         let group = |name, log_evidence| {
             let regressor = Regressor::Variable(place(name));
-            Group { axis: 0, kinds: BALANCES[0], regressor, log_evidence, loss_reduction: 2.0 * log_evidence }
+            Group { axis: 0, kinds: BALANCES[0], regressor, log_evidence, gain: 2.0 * log_evidence }
         };
         let first = |memory, plain| {
             let mut groups =

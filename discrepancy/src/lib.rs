@@ -10,11 +10,12 @@
 //! | [`engine`] | training records with their simulations and sensitivities |
 //! | `fit` | linear robust least squares over windows: the step of a fit, standard errors |
 //! | [`candidates`] | effects at places, and the scaling of their numbers |
+//! | [`suspects`] | candidates that the user declares in a file |
 //! | [`parameters`] | baseline parameters as nuisance parameters |
 //! | [`calibrate`] | calibration of these parameters |
 //! | [`screen`] | linear screening of candidates |
 //! | [`refit`] | nonlinear fit of effects in the simulator, by Gauss-Newton |
-//! | [`name`](mod@name) | forward selection and backward elimination of effects |
+//! | [`name`](mod@name) | selection, elimination, explanations with their probabilities, decision, test of the name |
 //! | [`extend`] | the extended rig file |
 //! | [`locate`] | unknown inputs of each balance |
 //! | `unknown_inputs` | a force on an axis, a flow into a chamber |

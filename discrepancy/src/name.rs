@@ -16,6 +16,21 @@
 //! Fits that are compared have the penalised loss J (`FittedModel::loss` of `refit` and `fit_all`), the reported model L and
 //! priors alone (`fit_selected`, `fit_for_comparison`); L is the loss of the windows (`fit.rs`).
 //!
+//! | file | holds |
+//! |---|---|
+//! | `round` | a round of forward selection: contenders, their fits |
+//! | `pitch` | pitch of a ripple by grid search |
+//! | `start_states` | refits of linked rods with start states of their own |
+//! | `heterogeneity` | homogeneity of amplitudes over windows, where a model lacks fit |
+//! | `null_distribution` | null threshold and detection limits by sign flips |
+//! | `elimination` | backward elimination, sequential replacement, alternatives |
+//! | `gauss_newton` | Gauss-Newton on all numbers in the simulator |
+//! | `needed_parameters` | backward elimination of parameters |
+//! | `explanations`, `probabilities` | sets of effects and their features; their conditional logit |
+//! | `marginal` | marginal likelihoods, reported beside |
+//! | `decision` | what is named |
+//! | `significance` | test of the name, by a parametric bootstrap |
+//!
 //! Source: discrepancy-notes.md, 3 to 8 and pipeline 5.
 
 mod decision;
@@ -71,7 +86,7 @@ const LACK_OF_FIT_PER_DOF_LINKED: f64 = 0.3;
 /// Screened gain that the best candidate must have for a round to be fitted; also the least gain of an effect that joins, of a
 /// homogeneous one, and that of a detection limit. An empirical value, about twice what chance gives: of forty independent null
 /// gains (chi2 of one degree of freedom) the largest has the median 5.7 and the 99th percentile 13.4.
-pub(crate) const MIN_LOSS_REDUCTION: f64 = 25.0;
+pub(crate) const MIN_GAIN: f64 = 25.0;
 /// Penalty for each fitted parameter of an effect.
 pub(crate) const EFFECT_PARAMETER_PENALTY: f64 = 8.0;
 /// Multiple of the null threshold required of a single effect.
@@ -294,7 +309,7 @@ fn relinearise(engine: &Engine<'_>, model: FittedModel) -> FittedModel {
 fn gains_enough(engine: &Engine<'_>, before: &FittedModel, after: &FittedModel) -> bool {
     let gain = before.loss - after.loss;
     let share = if before.effects.is_empty() { MIN_LOSS_SHARE_FIRST } else { MIN_LOSS_SHARE_FURTHER };
-    gain > (share * loss_where_last_acts(engine, before, after)).max(MIN_LOSS_REDUCTION)
+    gain > (share * loss_where_last_acts(engine, before, after)).max(MIN_GAIN)
 }
 
 /// The axes that effects act on; both where there is none.
@@ -384,8 +399,7 @@ fn least_coordinate(candidate: &Candidate, key: usize) -> f64 {
 /// of the records; the procedure finds fewer, since J has [`EFFECT_PARAMETER_PENALTY`] for each parameter of the effect.
 /// The smallest limit of several probes is optimistic for nonlinear effects.
 fn limits_of(null: &NullDistribution, columns: &Columns, threshold: f64) -> Vec<Option<f64>> {
-    let limits =
-        null.limits(columns.candidates.len(), (THRESHOLD_FACTOR_SINGLE * threshold).max(MIN_LOSS_REDUCTION));
+    let limits = null.limits(columns.candidates.len(), (THRESHOLD_FACTOR_SINGLE * threshold).max(MIN_GAIN));
     let floored = |(limit, candidate): (Option<f64>, &Candidate)| {
         limit.map(|limit: f64| limit.max(least_coordinate(candidate, 0)))
     };

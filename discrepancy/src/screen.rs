@@ -2,7 +2,7 @@
 //!
 //! Each probe is one column. Fitted jointly with the parameters' columns, its coefficient is the amplitude of an effect whose
 //! responses were proportional to it. Screening ranks, and ends the search where no gain exceeds
-//! [`crate::name::MIN_LOSS_REDUCTION`] and a share of the last threshold; the refit decides.
+//! [`crate::name::MIN_GAIN`] and a share of the last threshold; the refit decides.
 
 use crate::candidates::Candidate;
 use crate::engine::Engine;

@@ -21,7 +21,7 @@ use crate::calibrate::quantity;
 use crate::engine::Engine;
 use crate::locate::maps::map;
 use crate::locate::{UnknownPoint, UnknownSeries, VARIABLES};
-use crate::name::{MIN_LOSS_REDUCTION, share_removed};
+use crate::name::{MIN_GAIN, share_removed};
 use crate::parameters::{COUNT, with_factors};
 use crate::refit::FittedModel;
 use crate::report::{Quantity, TableTerm, UncataloguedTerm};
@@ -113,7 +113,7 @@ fn with_needed(engine: &Engine<'_>, best: Iterate) -> (Iterate, [bool; COUNT]) {
     };
     let linearisation = linearisation.columns_with(&[]);
     let bare = fit::steps(engine, all_fixed, &linearisation[COUNT..]);
-    let needed = fit::needed(engine, &bare, &linearisation, MIN_LOSS_REDUCTION);
+    let needed = fit::needed(engine, &bare, &linearisation, MIN_GAIN);
     let Some(start) = Iterate::of(engine, bare.model.clone().with_fixed(needed)) else {
         return (bare, [false; COUNT]);
     };

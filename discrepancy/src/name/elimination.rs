@@ -18,8 +18,8 @@ pub(crate) const INDISTINGUISHABLE_LOSS_DIFFERENCE: f64 = 9.0;
 const INDISTINGUISHABLE_LOSS_SHARE: f64 = 0.02;
 /// Multiple of the null threshold required of each effect while others remain, since no model is exact.
 const THRESHOLD_FACTOR_SEVERAL: f64 = 3.0;
-/// Share of the loss reduction of all effects together below which an effect is eliminated, whatever the threshold.
-const MIN_SHARE_OF_REDUCTION: f64 = 0.002;
+/// Share of the gain of all effects together below which an effect is eliminated, whatever the threshold.
+const MIN_SHARE_OF_GAIN: f64 = 0.002;
 
 #[derive(Clone)]
 pub(super) struct Selection {
@@ -106,7 +106,7 @@ impl Selection {
             let safety =
                 if fit.effects.is_empty() { THRESHOLD_FACTOR_SINGLE } else { THRESHOLD_FACTOR_SEVERAL };
             let share = loss_rise / (calibrated.loss - model.loss).max(1e-9);
-            if loss_rise > safety * threshold && share > MIN_SHARE_OF_REDUCTION {
+            if loss_rise > safety * threshold && share > MIN_SHARE_OF_GAIN {
                 break;
             }
             rounds.remove(at.min(rounds.len() - 1));

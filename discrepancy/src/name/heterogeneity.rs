@@ -16,7 +16,7 @@
 
 use super::elimination::Selection;
 use super::null_distribution::MAX_OUTLIER_SHARE;
-use super::{MIN_LOSS_REDUCTION, STEPS, is_large, lacks_fit, leading_key, loss_where_last_acts, relinearise};
+use super::{MIN_GAIN, STEPS, is_large, lacks_fit, leading_key, loss_where_last_acts, relinearise};
 use crate::engine::Engine;
 use crate::fit::Products;
 use crate::parameters::COUNT;
@@ -52,7 +52,7 @@ pub(super) fn prefer_homogeneous(
     let Some(most) = fits.first().map(gain) else { return false };
     let needed = |fit: &FittedModel| {
         let share = MIN_LOSS_SHARE * loss_where_last_acts(engine, before, fit);
-        share.max(MIN_LOSS_REDUCTION).max(MIN_GAIN_SHARE * most)
+        share.max(MIN_GAIN).max(MIN_GAIN_SHARE * most)
     };
     let is_homogeneous = |fit: &FittedModel| {
         let variation = amplitude_variation(engine, linearisation, fit);

@@ -9,7 +9,7 @@ use super::elimination::is_same_effect;
 use super::gauss_newton::fit_all;
 use super::pitch::at_best_pitch;
 use super::start_states::{FitWithStartStates, backlash_start, refit_with_starts};
-use super::{LACK_OF_FIT_PER_DOF, MIN_LOSS_REDUCTION, STEPS, amplitude_ratio, lacks_fit, relinearise};
+use super::{LACK_OF_FIT_PER_DOF, MIN_GAIN, STEPS, amplitude_ratio, lacks_fit, relinearise};
 use crate::engine::Engine;
 use crate::refit::{EffectEstimate, FittedModel, Linearisation, loss_at, refit_steps, relinearise_once};
 use crate::screen::{Columns, ScreenedCandidate};
@@ -75,9 +75,7 @@ impl Contenders {
             all.into_iter().partition(|screened| amplitude_ratio(&screened.start) > MIN_SCREENED_RATIO);
         let gain = |screened: &ScreenedCandidate| loss_before - screened.loss;
         let enough = |screened: &[ScreenedCandidate]| {
-            screened
-                .first()
-                .is_some_and(|best| gain(best) > MIN_LOSS_REDUCTION.max(SEARCHED_SHARE * threshold))
+            screened.first().is_some_and(|best| gain(best) > MIN_GAIN.max(SEARCHED_SHARE * threshold))
         };
         let is_backlash =
             |screened: &&ScreenedCandidate| columns.candidates[screened.at].sheet.moves_start_states;

@@ -22,7 +22,7 @@ mod sequential;
 use super::elimination::is_same_set;
 use super::explanations::Explanation;
 use super::gauss_newton::coordinates;
-use super::{MIN_LOSS_REDUCTION, is_large, lacks_fit};
+use super::{MIN_GAIN, is_large, lacks_fit};
 use crate::engine::Engine;
 use crate::fit::{MIN_CHI2_PER_DOF, Products, loss};
 use crate::refit::{
@@ -73,9 +73,9 @@ impl Fitted<'_> {
         let least_gain = if !self.engine.is_linked() {
             0.0
         } else if lacks_fit(self.engine, model.loss) {
-            MIN_LOSS_REDUCTION
+            MIN_GAIN
         } else {
-            self.threshold.max(MIN_LOSS_REDUCTION)
+            self.threshold.max(MIN_GAIN)
         };
         let gain_without_best = without_best(&gains) - penalty;
         let chance = if self.engine.is_linked() {

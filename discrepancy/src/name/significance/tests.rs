@@ -86,7 +86,7 @@ fn what_best_fits_noise_is_not_significant_and_neither_is_a_gain_of_the_best_win
     assert!(left_out > 0);
     model.squares[..left_out].iter_mut().for_each(|square| *square *= 0.5);
     let tests = case.significance(&model, &[]);
-    assert!(tests.gain > MIN_LOSS_REDUCTION && tests.gain_without_best < 0.0, "{tests:?}");
+    assert!(tests.gain > MIN_GAIN && tests.gain_without_best < 0.0, "{tests:?}");
     assert_eq!(tests.rejection_reason(), Some("gains too little outside its best windows"));
     model.squares.iter_mut().for_each(|square| *square *= 0.9);
     assert_eq!(case.significance(&model, &[]).rejection_reason(), None);
