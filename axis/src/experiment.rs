@@ -41,7 +41,7 @@ pub(crate) use axis::{OperatorLimits, Prepare, SetPoints};
 
 use crate::chains::AfterStop;
 use crate::chains::main::Start;
-use settings::parameters::Parameter;
+use settings::parameters::{Parameter, declare};
 use settings::{Section, SettingsError, Source};
 use std::path::Path;
 
@@ -71,29 +71,26 @@ pub struct Experiment {
 /// Repetitions, settling, start and restart of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunSection {
-    /// How often it is driven through, each from initial positioning on.
-    pub repetitions: u32,
-    /// How long an axis must stand still before and after, s.
-    pub(crate) settling_s: f64,
-    /// How long a state of the main chain may take beyond its own length before it is given up, s.
-    pub(crate) settling_timeout_s: f64,
+    /// Its numbers.
+    pub(crate) numbers: RunNumbers,
     /// Start condition once both axes have settled.
     pub(crate) start: Start,
     /// What follows once the rig has recovered; the command line may override it.
     pub(crate) after_emergency_stop: AfterStop,
 }
 
+settings::parameters! {
+    /// Repetitions and settling of an experiment.
+    pub(crate) struct RunNumbers {
+        repetitions: declare("times", [1.0, 1e6], 1.0,
+            "how often it is driven through, each time from initial positioning on").whole(),
+        settling_s: declare("s", [0.0, 60.0], 0.5, "how long an axis stands still before and after"),
+        settling_timeout_s: declare("s", [0.1, 3600.0], 10.0,
+            "how long a state of the main chain may take beyond its own length before it is given up"),
+    }
+}
+
 static NUMBER: Parameter = Parameter::new(("number", ""), [1.0, 255.0], 1.0, "name on the bus");
-static REPETITIONS: Parameter =
-    Parameter::new(("repetitions", "times"), [1.0, 1e6], 1.0, "how often it is driven through");
-static SETTLING: Parameter =
-    Parameter::new(("settling_s", "s"), [0.0, 60.0], 0.5, "how long it stands still before and after");
-static SETTLING_TIMEOUT: Parameter = Parameter::new(
-    ("settling_timeout_s", "s"),
-    [0.1, 3600.0],
-    10.0,
-    "how long a waiting state may take before it is given up",
-);
 static EVERY: Parameter =
     Parameter::new(("every_cycles", "cycles"), [1.0, 1000.0], 1.0, "cycles between two rows");
 
@@ -135,11 +132,14 @@ impl Experiment {
 }
 
 impl RunSection {
+    /// How often the experiment is driven through.
+    pub fn repetitions(&self) -> u32 {
+        self.numbers.repetitions as u32 // a whole number in its range
+    }
+
     fn read(mut section: Section<'_>) -> Result<Self, SettingsError> {
         let run = Self {
-            repetitions: section.whole_or_default(&REPETITIONS)?,
-            settling_s: section.number_or_default(&SETTLING)?,
-            settling_timeout_s: section.number_or_default(&SETTLING_TIMEOUT)?,
+            numbers: section.parameters()?,
             start: section
                 .choice("start", &[("by-itself", Start::ByItself), ("on-start", Start::OnStart)])?,
             after_emergency_stop: section.choice(
@@ -147,8 +147,8 @@ impl RunSection {
                 &[("end", AfterStop::End), ("restart", AfterStop::Restart), ("on-start", AfterStop::OnStart)],
             )?,
         };
-        if run.settling_timeout_s <= run.settling_s {
-            let Self { settling_s, settling_timeout_s, .. } = run;
+        let RunNumbers { settling_s, settling_timeout_s, .. } = run.numbers;
+        if settling_timeout_s <= settling_s {
             let message = format!(
                 "settling_timeout_s = {settling_timeout_s} s; allowed is above settling_s, which is {settling_s} s"
             );

@@ -320,9 +320,9 @@ impl Inputs {
                 experiment_s: self.experiment.duration_s(),
             },
             approach_longest_s: approach_s(0.0, self.rig.cylinder().stroke_m),
-            repetitions: (!mode.forever).then_some(run.repetitions),
-            settling_s: run.settling_s,
-            settling_timeout_s: run.settling_timeout_s,
+            repetitions: (!mode.forever).then_some(run.repetitions()),
+            settling_s: run.numbers.settling_s,
+            settling_timeout_s: run.numbers.settling_timeout_s,
             start: run.start,
             after_emergency_stop: run.after_emergency_stop,
             settled: Bounds::of(program.task(Task::Settled)),
@@ -345,7 +345,7 @@ fn lengths(section: &AxisExperiment, program: &Program) -> Lengths {
     let ramps = section.initial_force_n() > 0.0;
     Lengths {
         prepare_s: section.prepare.iter().map(step_s).sum(),
-        initial_force_s: if ramps { section.initial_ramp_s } else { 0.0 },
+        initial_force_s: if ramps { section.force.initial_ramp_s } else { 0.0 },
         experiment_s: section.set_points.duration_s(),
     }
 }
@@ -355,7 +355,7 @@ fn plan(section: &AxisExperiment) -> Plan {
         SetPoints::Positions(motion) => Plan::Position { motion: motion.clone(), by_hand: section.by_hand },
         SetPoints::Forces(profile) => Plan::Force(ForcePlan {
             source: ForceSource::new(profile.clone()),
-            initial_ramp_s: section.initial_ramp_s,
+            initial_ramp_s: section.force.initial_ramp_s,
             prepare: section.prepare.clone(),
             manual: section.manual,
             by_hand: section.by_hand,

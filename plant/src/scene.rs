@@ -56,10 +56,7 @@ use crate::parameters::RigParameters;
 use crate::plant::Plant;
 use crate::setup::Setup;
 
-pub use hand::{
-    DEFAULT_DAMPING_N_S_PER_M, DEFAULT_MOST_N, DEFAULT_RAMP_S, DEFAULT_STIFFNESS_N_PER_M, DEFAULT_TRAVEL_S,
-    Hand, HandAction, HandForces, Part,
-};
+pub use hand::{GuidingArm, Hand, HandAction, HandForces, Part};
 pub use people::{Outcome, People, Script};
 /// Why the `[rig]` of an experiment is refused: file, line, key, value and what is allowed.
 pub use settings::SettingsError as SceneError;

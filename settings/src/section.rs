@@ -4,7 +4,7 @@
 //! those that were asked for.
 
 use crate::number;
-use crate::parameters::Parameter;
+use crate::parameters::{Parameter, ParameterSet};
 use crate::source::{Result, SettingsError, Source};
 use crate::spelling::nearest;
 use std::path::{Path, PathBuf};
@@ -190,6 +190,15 @@ impl<'a> Section<'a> {
     /// No number, or out of range.
     pub fn number_or_default(&mut self, parameter: &Parameter) -> Result<f64> {
         Ok(self.number(parameter)?.unwrap_or(parameter.default))
+    }
+
+    /// The numbers of these parameters, read in the order of their table, each the default where its key is absent.
+    ///
+    /// # Errors
+    /// No number, or out of range.
+    pub fn parameters<P: ParameterSet>(&mut self) -> Result<P> {
+        let numbers = P::TABLE.iter().map(|parameter| self.number_or_default(parameter));
+        Ok(P::of(&numbers.collect::<Result<Vec<_>>>()?))
     }
 
     /// The number of this parameter, which must be there.

@@ -24,7 +24,7 @@
 
 use crate::set_point::{ForceProfile, Motion, reading};
 use algorithms::algorithm::Quantity;
-use settings::parameters::Parameter;
+use settings::parameters::{Parameter, declare};
 use settings::{Section, SettingsError};
 use std::path::{Path, PathBuf};
 
@@ -38,8 +38,8 @@ pub struct AxisExperiment {
     pub start_m: Option<f64>,
     /// Steps of the preparation after initial positioning, in this order.
     pub(crate) prepare: Vec<Prepare>,
-    /// Time of the ramp from 0 to the initial force, s.
-    pub(crate) initial_ramp_s: f64,
+    /// Limit and initial ramp; the defaults with a row of positions.
+    pub(crate) force: ForceNumbers,
     /// A hand leads the axis during the experiment, under force control with set-point zero, instead of its set-points.
     /// Not used with a row of positions.
     pub(crate) manual: bool,
@@ -116,10 +116,14 @@ pub(crate) struct Change {
     pub(crate) line: usize,
 }
 
-static RAMP: Parameter =
-    Parameter::new(("initial_ramp_s", "s"), [0.01, 60.0], 1.0, "how long the initial force is ramped to");
-static FORCE_LIMIT: Parameter =
-    Parameter::new(("force_limit_n", "N"), [1.0, 2000.0], 1000.0, "largest force that is asked for");
+settings::parameters! {
+    /// Limit and initial ramp of a row of forces.
+    pub(crate) struct ForceNumbers {
+        force_limit_n: declare("N", [1.0, 2000.0], 1000.0, "largest force that is asked for"),
+        initial_ramp_s: declare("s", [0.01, 60.0], 1.0, "how long the initial force is ramped to"),
+    }
+}
+
 static BY_HAND_SPEED: Parameter = Parameter::new(
     ("by_hand_speed_m_per_s", "m/s"),
     [0.001, 1.0],
@@ -154,7 +158,7 @@ impl AxisExperiment {
         let manual = section.choice("during", &DURING)?;
         let segments = section.sections("set-point")?;
         let quantity = reading::quantity(&segments)?.unwrap_or(usual);
-        let mut initial_ramp_s = RAMP.default;
+        let mut force = ForceNumbers::default();
         let by_hand;
         let set_points = match quantity {
             Quantity::Position => {
@@ -168,7 +172,8 @@ impl AxisExperiment {
                 SetPoints::Positions(reading::motion(start_m, segments, stroke_m)?)
             }
             Quantity::Force => {
-                let limit_n = section.number_or_default(&FORCE_LIMIT)?;
+                force = section.parameters()?;
+                let limit_n = force.force_limit_n;
                 let initial = Parameter::new(
                     ("initial_force_n", "N"),
                     [0.0, limit_n],
@@ -176,7 +181,6 @@ impl AxisExperiment {
                     "force that it begins with",
                 );
                 let initial_n = section.number_or_default(&initial)?;
-                initial_ramp_s = section.number_or_default(&RAMP)?;
                 let rate = section.number(&BY_HAND_RATE)?;
                 by_hand = rate.map(|rate_per_s| OperatorLimits { rate_per_s, range: [0.0, limit_n] });
                 SetPoints::Forces(reading::forces([initial_n, limit_n], segments, stroke_m)?)
@@ -191,7 +195,7 @@ impl AxisExperiment {
         let mut changes = changes?;
         changes.sort_by(|one, other| one.at_s.total_cmp(&other.at_s));
         section.finish()?;
-        Ok(Self { program, start_m, prepare, initial_ramp_s, manual, set_points, by_hand, changes })
+        Ok(Self { program, start_m, prepare, force, manual, set_points, by_hand, changes })
     }
 
     /// The force that the axis begins with, N; 0 when it is position controlled.

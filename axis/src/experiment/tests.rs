@@ -40,9 +40,7 @@ anything = { least = 1 }
 
 /// `[run]` when nothing is said.
 const USUAL: RunSection = RunSection {
-    repetitions: 1,
-    settling_s: 0.5,
-    settling_timeout_s: 10.0,
+    numbers: RunNumbers { repetitions: 1.0, settling_s: 0.5, settling_timeout_s: 10.0 },
     start: Start::ByItself,
     after_emergency_stop: AfterStop::End,
 };
@@ -56,10 +54,9 @@ fn a_good_file_is_read() {
     let experiment = read(GOOD).unwrap();
     assert_eq!((experiment.number, experiment.about.as_str(), experiment.duration_s()), (9, "", 5.0));
     let expected = RunSection {
-        repetitions: 3,
+        numbers: RunNumbers { repetitions: 3.0, ..USUAL.numbers },
         start: Start::OnStart,
         after_emergency_stop: AfterStop::Restart,
-        ..USUAL
     };
     assert_eq!(experiment.run, expected);
     assert_eq!(experiment.record_every_cycles, 10);
@@ -71,7 +68,7 @@ fn a_good_file_is_read() {
     );
     assert_eq!((drive.start_m, load.start_m), (Some(0.1), None));
     assert_eq!(load.prepare, [Prepare::Match, Prepare::Relieve]);
-    assert_eq!((load.manual, load.initial_force_n(), load.initial_ramp_s), (true, 100.0, 1.0));
+    assert_eq!((load.manual, load.initial_force_n(), load.force.initial_ramp_s), (true, 100.0, 1.0));
     let changes: Vec<_> =
         drive.changes.iter().map(|change| (change.at_s, change.value, change.line)).collect();
     assert_eq!(changes, [(1.0, 20.0, 22), (2.0, 30.0, 18)], "in the order of their times");

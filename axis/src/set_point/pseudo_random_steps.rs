@@ -24,9 +24,9 @@ pub(super) const KIND: Kind = Kind {
 };
 
 static HOLD: Parameter = Parameter::new(("hold_s", "s"), [0.001, 3600.0], 0.1, "time between two steps");
-static SEED: Parameter = Parameter::new(("seed", ""), [0.0, 4_294_967_295.0], 1.0, "which steps, whole");
+static SEED: Parameter = Parameter::new(("seed", ""), [0.0, 4_294_967_295.0], 1.0, "which steps").whole();
 static LEVELS: Parameter =
-    Parameter::new(("levels", ""), [2.0, 64.0], 2.0, "how many levels there are, whole");
+    Parameter::new(("levels", ""), [2.0, 64.0], 2.0, "how many levels there are").whole();
 /// Steps that a segment may have; they are drawn when it is read.
 const MOST_STEPS: f64 = 1e6;
 

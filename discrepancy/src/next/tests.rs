@@ -56,7 +56,7 @@ fn every_entry_is_a_file_of_its_title_that_the_controller_takes() {
         let twice = Files::of_texts(&rig, (entry.name, &text(entry, 2)), menu::program, &[]);
         let scene = plant::Scene::from_toml(entry.toml, entry.name, &rig).expect("a scene");
         assert_eq!(scene.linked, entry.is_linked(), "{}", entry.name);
-        assert_eq!(twice.expect("with repetitions").experiment.run.repetitions, 2, "{}", entry.name);
+        assert_eq!(twice.expect("with repetitions").experiment.run.repetitions(), 2, "{}", entry.name);
     }
     let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments");
     let files = std::fs::read_dir(folder).expect("the menu's folder").count();

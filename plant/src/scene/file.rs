@@ -8,10 +8,8 @@ use std::path::Path;
 use settings::parameters::Parameter;
 use settings::{Result, Section, Source};
 
-use super::hand::{
-    DEFAULT_DAMPING_N_S_PER_M, DEFAULT_MOST_N, DEFAULT_RAMP_S, DEFAULT_STIFFNESS_N_PER_M, DEFAULT_TRAVEL_S,
-};
-use super::{Action, Event, Hand, HandAction, Part, Scene, cycle_of};
+use super::hand::STRONGEST_N;
+use super::{Action, Event, GuidingArm, Hand, HandAction, Part, Scene, cycle_of};
 use crate::parameters::RigParameters;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -34,32 +32,14 @@ const PARTS: [(&str, Part); 2] = [("carriage", Part::Carriage), ("load-eye", Par
 
 /// Times of a script, s: up to more than a day.
 const TIMES_S: [f64; 2] = [0.0, 1e5];
-/// Strongest push, N: what the bus can ask of a hand.
-const STRONGEST_N: f64 = 2000.0;
 
 static FROM: Parameter = Parameter::new(("from_s", "s"), TIMES_S, 0.0, "when the hand is put on");
 static TO: Parameter = Parameter::new(("to_s", "s"), TIMES_S, 0.0, "when it lets go");
 static FORCE: Parameter =
     Parameter::new(("force_n", "N"), [-STRONGEST_N, STRONGEST_N], 0.0, "force of a push");
+// The default is a guess.
 static RAMP: Parameter =
-    Parameter::new(("ramp_s", "s"), [0.0, 60.0], DEFAULT_RAMP_S, "how long a push takes to its force");
-static TRAVEL: Parameter =
-    Parameter::new(("travel_s", "s"), [0.01, 3600.0], DEFAULT_TRAVEL_S, "how long a guiding hand travels");
-// Held over a cycle of 1 ms on at least half a kilogram, both ends of these ranges are stable.
-static STIFFNESS: Parameter = Parameter::new(
-    ("stiffness_n_per_m", "N/m"),
-    [1.0, 20_000.0],
-    DEFAULT_STIFFNESS_N_PER_M,
-    "stiffness of a guiding arm",
-);
-static DAMPING: Parameter = Parameter::new(
-    ("damping_n_s_per_m", "N s/m"),
-    [0.0, 500.0],
-    DEFAULT_DAMPING_N_S_PER_M,
-    "damping of a guiding arm",
-);
-static MOST: Parameter =
-    Parameter::new(("most_n", "N"), [1.0, STRONGEST_N], DEFAULT_MOST_N, "most that a guiding arm pulls");
+    Parameter::new(("ramp_s", "s"), [0.0, 60.0], 0.05, "how long a push takes to its force and back");
 static AT: Parameter = Parameter::new(("at_s", "s"), TIMES_S, 0.0, "when it is done");
 static UNTIL: Parameter = Parameter::new(("until_s", "s"), TIMES_S, 0.0, "until when it is tried");
 
@@ -115,19 +95,17 @@ fn hand(mut table: Section<'_>, rig: &RigParameters) -> Result<Hand> {
     let guide_to = place("guide_to_m", rig);
     let action = match (table.number(&FORCE)?, table.number(&guide_to)?) {
         (Some(force_n), None) => {
-            let of_a_guide = ["travel_s", "stiffness_n_per_m", "damping_n_s_per_m", "most_n"];
+            let of_a_guide: Vec<&str> = GuidingArm::TABLE.iter().map(|key| &*key.name).collect();
             none_of(&table, &of_a_guide, "it belongs to a hand with guide_to_m, and this one has force_n")?;
             HandAction::Push { force_n, ramp_s: table.number_or_default(&RAMP)? }
         }
         (None, Some(guide_to_m)) => {
             none_of(&table, &["ramp_s"], "it belongs to a hand with force_n, and this one has guide_to_m")?;
-            HandAction::Guide {
-                guide_to_m,
-                travel_s: table.number(&TRAVEL)?.unwrap_or(TRAVEL.default.min(to_s - from_s)),
-                stiffness_n_per_m: table.number_or_default(&STIFFNESS)?,
-                damping_n_s_per_m: table.number_or_default(&DAMPING)?,
-                most_n: table.number_or_default(&MOST)?,
+            let mut arm: GuidingArm = table.parameters()?;
+            if !table.has("travel_s") {
+                arm.travel_s = arm.travel_s.min(to_s - from_s);
             }
+            HandAction::Guide { guide_to_m, arm }
         }
         _ => {
             let rule = "a hand has one of force_n, guide_to_m: it pushes or it guides";

@@ -15,21 +15,27 @@ use std::f64::consts::TAU;
 use std::ops::Add;
 
 use serde::Serialize;
+use settings::parameters::declare;
 
 use super::cycle_of;
 use crate::plant::Plant;
 use crate::state::Inputs;
 
-/// How long a push takes to its full force and back, s; a guess.
-pub const DEFAULT_RAMP_S: f64 = 0.05;
-/// How long a guiding hand travels, s, or as long as it acts if that is shorter; a guess.
-pub const DEFAULT_TRAVEL_S: f64 = 1.0;
-/// Stiffness of a guiding arm, N/m; a guess: some 7 cm of give at the full force.
-pub const DEFAULT_STIFFNESS_N_PER_M: f64 = 2000.0;
-/// Damping of a guiding arm, N s/m; a guess: little beside the pistons' own 1100 N s/m.
-pub const DEFAULT_DAMPING_N_S_PER_M: f64 = 60.0;
-/// Most that a guiding arm pulls or pushes, N; a guess for one arm of a standing person.
-pub const DEFAULT_MOST_N: f64 = 150.0;
+/// Strongest push, N: what the bus can ask of a hand.
+pub(super) const STRONGEST_N: f64 = 2000.0;
+
+settings::parameters! {
+    /// The arm of a guiding hand. Held over a cycle of 1 ms on at least half a kilogram, both ends of the ranges of stiffness and
+    /// damping are stable. All defaults are guesses: some 7 cm of give at the full force, a damping that is little beside the
+    /// pistons' own 1100 N s/m, the force of one arm of a standing person.
+    #[derive(Serialize)]
+    pub struct GuidingArm {
+        travel_s: declare("s", [0.01, 3600.0], 1.0, "how long a guiding hand travels, or as long as it acts if that is shorter"),
+        stiffness_n_per_m: declare("N/m", [1.0, 20_000.0], 2000.0, "stiffness of a guiding arm"),
+        damping_n_s_per_m: declare("N s/m", [0.0, 500.0], 60.0, "damping of a guiding arm"),
+        most_n: declare("N", [1.0, STRONGEST_N], 150.0, "most that a guiding arm pulls to either side"),
+    }
+}
 
 /// What a hand can be put on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -70,14 +76,9 @@ pub enum HandAction {
     Guide {
         /// Where the target ends, m in rig coordinates.
         guide_to_m: f64,
-        /// How long it travels, s.
-        travel_s: f64,
-        /// Stiffness of the arm, N/m.
-        stiffness_n_per_m: f64,
-        /// Damping of the arm, N s/m.
-        damping_n_s_per_m: f64,
-        /// Most that it pulls to either side, N.
-        most_n: f64,
+        /// The arm that pulls it.
+        #[serde(flatten)]
+        arm: GuidingArm,
     },
 }
 
@@ -148,7 +149,8 @@ impl ActiveHand {
                 let nearest_s = since_s.min(left_s);
                 if nearest_s < ramp_s { force_n * (nearest_s / ramp_s) } else { force_n }
             }
-            HandAction::Guide { guide_to_m, travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } => {
+            HandAction::Guide { guide_to_m, arm } => {
+                let GuidingArm { travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } = arm;
                 let (x_m, v_m_per_s) = self.hand.on.motion(plant);
                 let x_from_m = *self.x_from_m.get_or_insert(x_m);
                 let z = (since_s / travel_s).min(1.0);

@@ -1,6 +1,7 @@
 //! Tests of the reader of sections.
 
 use super::*;
+use crate::parameters::declare;
 use crate::spelling::edits;
 
 #[test]
@@ -69,4 +70,23 @@ fn a_whole_number_has_no_fraction_and_no_sign() {
         assert!(message.starts_with(&format!("file.toml:{line}: {name} = ")), "{message}");
         assert!(message.contains("allowed is a whole number"), "{message}");
     }
+}
+
+crate::parameters! {
+    /// Two numbers of a table.
+    struct Pair {
+        first_s: declare("s", [0.0, 9.0], 1.0, "first"),
+        second: declare("", [0.0, 9.0], 2.0, "second").whole(),
+    }
+}
+
+#[test]
+fn parameters_are_those_of_the_file_or_the_defaults_and_checked() {
+    let source =
+        Source::parse("second = 3\nfirst_s = 10\n[a]\nsecond = 3", Path::new("f.toml")).expect("TOML");
+    let mut section = source.root().needed_section("a", "one").expect("there");
+    assert_eq!(section.parameters(), Ok(Pair { first_s: 1.0, second: 3.0 }));
+    assert_eq!(section.finish(), Ok(()));
+    let message = source.root().parameters::<Pair>().unwrap_err().to_string();
+    assert_eq!(message, "f.toml:2: first_s = 10 s; allowed is 0 to 9 s");
 }
