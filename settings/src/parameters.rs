@@ -167,6 +167,21 @@ pub trait ParameterSet: Sized {
 /// assert_eq!(Position::default().gain_per_s, 20.0);
 /// ```
 ///
+/// A name that is no name of a field stands behind it. The place of a parameter in the table has its field's name:
+///
+/// ```
+/// use settings::parameters::declare;
+///
+/// settings::parameters! {
+///     struct Controls {
+///         length as "trace.length_samples": declare("", [1.0, 4096.0], 1000.0, "samples in all").whole(),
+///     }
+/// }
+///
+/// assert_eq!((&*Controls::TABLE[0].name, Controls::default().length), ("trace.length_samples", 1000.0));
+/// assert_eq!(Controls::length, 0);
+/// ```
+///
 /// The parameter of another algorithm does not compile, as a field or as a whole:
 ///
 /// ```compile_fail,E0609
@@ -195,7 +210,11 @@ pub trait ParameterSet: Sized {
 /// ```
 #[macro_export]
 macro_rules! parameters {
-    ($(#[$about:meta])* $visibility:vis struct $name:ident { $($field:ident: $declaration:expr,)+ }) => {
+    (@name $field:ident) => { stringify!($field) };
+    (@name $field:ident $key:literal) => { $key };
+    ($(#[$about:meta])* $visibility:vis struct $name:ident {
+        $($field:ident $(as $key:literal)?: $declaration:expr,)+
+    }) => {
         $(#[$about])*
         #[derive(Clone, Copy, Debug, PartialEq)]
         #[allow(missing_docs)] // what a field means stands in the table
@@ -204,7 +223,7 @@ macro_rules! parameters {
         impl $name {
             /// Name, unit, range, default and meaning of each.
             $visibility const TABLE: &'static [$crate::parameters::Parameter] =
-                &[$($crate::parameters::Parameter::declared(stringify!($field), $declaration)),+];
+                &[$($crate::parameters::Parameter::declared($crate::parameters!(@name $field $($key)?), $declaration)),+];
 
             /// The values of a slice in the order of the table.
             ///
@@ -219,6 +238,17 @@ macro_rules! parameters {
                 Self { $($field),+ }
             }
         }
+
+        const _: () = {
+            #[allow(non_camel_case_types)]
+            enum Place { $($field),+ }
+
+            #[allow(dead_code, non_upper_case_globals)] // few tables are read by place
+            impl $name {
+                $(/// Its place in the table.
+                $visibility const $field: usize = Place::$field as usize;)+
+            }
+        };
 
         impl $crate::parameters::ParameterSet for $name {
             const TABLE: &'static [$crate::parameters::Parameter] = Self::TABLE;

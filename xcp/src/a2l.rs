@@ -12,7 +12,7 @@ use crate::image::{
 };
 use crate::signals::{Format, SIGNALS};
 use crate::slave::{BLOCK_PACKETS, TextLocations};
-use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, STATUS};
+use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, Controls, STATUS};
 use crate::{EVENT_NAME, identifiers};
 use a2lfile::{
     A2lObjectName, AddrType, Characteristic, CharacteristicType, CompuMethod, CompuTabRef, CompuVtab,
@@ -245,9 +245,12 @@ impl A2lBuilder<'_> {
         let mut names = Vec::new();
         for (place, control) in CONTROLS.iter().enumerate() {
             let conversion = match place {
-                trace::SOURCE => self.names("signal", &signals),
-                trace::SLOPE => self.names("slope", &["rising", "falling", "either", "at-once"]),
-                _ if (trace::CHANNEL..trace::ARM).contains(&place) => self.names("signal", &signals),
+                Controls::source
+                | Controls::channel_1
+                | Controls::channel_2
+                | Controls::channel_3
+                | Controls::channel_4 => self.names("signal", &signals),
+                Controls::slope => self.names("slope", &["rising", "falling", "either", "at-once"]),
                 _ => self.unit(&control.unit),
             };
             let address = CONTROL + place as u32 * WIDE;

@@ -16,7 +16,7 @@
 
 use crate::packet::Refusal;
 use crate::signals::{COUNT, Format, SIGNALS};
-use crate::trace::{self, ARM, CAPACITY, CHANNELS, CONTROLS, LOAD_SET, STATUS, Trace};
+use crate::trace::{self, CAPACITY, CHANNELS, CONTROLS, ControlValues, Controls, STATUS, Trace};
 use axis_control::program::Variable;
 
 /// First addresses of the regions.
@@ -72,7 +72,7 @@ pub struct Image {
     pub(crate) description: Vec<u8>,
     variables: Vec<Variable>,
     parameters: Vec<f64>,
-    controls: [f64; CONTROLS.len()],
+    controls: ControlValues,
     signals: [f64; COUNT],
     pub(crate) trace: Trace,
     partial: Option<PartialValue>,
@@ -164,7 +164,7 @@ impl Image {
         match region {
             Region::Description => [0; 8],
             Region::Parameters => Format::Double.encode(self.parameters[place]),
-            Region::Controls if place == ARM => long(u32::from(self.trace.runs())),
+            Region::Controls if place == Controls::arm => long(u32::from(self.trace.runs())),
             Region::Controls => trace::control_format(place).encode(self.controls[place]),
             Region::Signals => SIGNALS[place].format.encode(self.signals[place]),
             Region::TraceStatus => long(self.trace.reported()[place]),
@@ -199,7 +199,7 @@ impl Image {
         let mut rest = None;
         for take in [false, true] {
             // A load may find its queue full, so that it comes before anything is stored.
-            if take && controls[LOAD_SET] != 0.0 && !actions.load() {
+            if take && controls[Controls::load_set] != 0.0 && !actions.load() {
                 return Err(Refusal::Busy);
             }
             let mut value = partial.unwrap_or(PartialValue { next: address, bytes: [0; 8], count: 0 });
@@ -239,7 +239,7 @@ impl Image {
         region: Region,
         place: usize,
         bytes: [u8; 8],
-        controls: &mut [f64; CONTROLS.len()],
+        controls: &mut ControlValues,
     ) -> Result<(), Refusal> {
         let (parameter, format) = match region {
             Region::Parameters => (&self.variables[place].parameter, Format::Double),
@@ -254,7 +254,7 @@ impl Image {
         }
         if region == Region::Controls {
             controls[place] = value;
-            if place == ARM && value != 0.0 && !Trace::can_arm(controls) {
+            if place == Controls::arm && value != 0.0 && !Trace::can_arm(&Controls::of(controls)) {
                 return Err(Refusal::Sequence);
             }
         }
@@ -279,9 +279,9 @@ impl Image {
         }
         let value = trace::control_format(place).decode(bytes);
         match place {
-            ARM if value == 0.0 => self.trace.disarm(),
-            ARM => self.trace.arm(&self.controls),
-            LOAD_SET => {}
+            Controls::arm if value == 0.0 => self.trace.disarm(),
+            Controls::arm => self.trace.arm(&Controls::of(&self.controls)),
+            Controls::load_set => {}
             _ => self.controls[place] = value,
         }
         Ok(())
@@ -408,7 +408,7 @@ pub(super) mod tests {
     #[test]
     fn a_block_whose_load_finds_a_full_queue_changes_nothing() {
         let (mut image, mut log) = (image(), ActionLog { is_busy: true, ..ActionLog::default() });
-        let channel_4 = CONTROL + WIDE * (LOAD_SET as u32 - 2);
+        let channel_4 = CONTROL + WIDE * Controls::channel_4 as u32;
         let block: Vec<u8> = [3_u64, 0, 1].iter().flat_map(|value| value.to_le_bytes()).collect();
         assert_eq!(image.write(channel_4, &block, &mut log), Err(Refusal::Busy));
         assert_eq!(read::<4>(&image, channel_4), 17_u32.to_le_bytes());
@@ -462,17 +462,17 @@ pub(super) mod tests {
         let mut put = |image: &mut Image, place: usize, value: u32| {
             image.write(CONTROL + place as u32 * WIDE, &value.to_le_bytes(), &mut log)
         };
-        put(&mut image, trace::LENGTH, 4).unwrap();
-        put(&mut image, trace::PRE_TRIGGER, 4).unwrap();
-        assert_eq!(put(&mut image, ARM, 1), Err(Refusal::Sequence), "no room for the trigger");
-        put(&mut image, trace::PRE_TRIGGER, 1).unwrap();
-        put(&mut image, trace::SLOPE, 3).unwrap();
-        put(&mut image, ARM, 1).unwrap();
-        assert_eq!(read::<4>(&image, CONTROL + ARM as u32 * WIDE), 1_u32.to_le_bytes());
+        put(&mut image, Controls::length, 4).unwrap();
+        put(&mut image, Controls::pre_trigger, 4).unwrap();
+        assert_eq!(put(&mut image, Controls::arm, 1), Err(Refusal::Sequence), "no room for the trigger");
+        put(&mut image, Controls::pre_trigger, 1).unwrap();
+        put(&mut image, Controls::slope, 3).unwrap();
+        put(&mut image, Controls::arm, 1).unwrap();
+        assert_eq!(read::<4>(&image, CONTROL + Controls::arm as u32 * WIDE), 1_u32.to_le_bytes());
         for cycle in 100..110 {
             image.refresh(cycle, &[cycle as f64; COUNT], &[25.0, 1.0, 15.0]);
         }
-        assert_eq!(read::<4>(&image, CONTROL + ARM as u32 * WIDE), 0_u32.to_le_bytes());
+        assert_eq!(read::<4>(&image, CONTROL + Controls::arm as u32 * WIDE), 0_u32.to_le_bytes());
         assert_eq!(read::<8>(&image, TRACE_STATUS), [4, 0, 0, 0, 4, 0, 0, 0]);
         assert_eq!(read::<4>(&image, TRACE_CYCLES + 8), 102_u32.to_le_bytes());
         assert_eq!(read::<8>(&image, TRACE_CHANNELS + CHANNEL_STEP + 16), 102.0_f64.to_le_bytes());

@@ -12,60 +12,43 @@
 //! cycle. Settings apply from the next arming on. The buffer is allocated at the start.
 
 use crate::signals::{COUNT, Format};
-use settings::parameters::Parameter;
+use settings::parameters::{Declaration, Parameter, declare};
 
 /// Samples that the buffer holds at most.
 pub(crate) const CAPACITY: usize = 4096;
 /// Number of signals that the buffer records.
 pub(crate) const CHANNELS: usize = 4;
 
-/// Places in [`CONTROLS`], which says what each is.
-pub(crate) const SOURCE: usize = 0;
-pub(crate) const THRESHOLD: usize = 1;
-pub(crate) const SLOPE: usize = 2;
-pub(crate) const PRE_TRIGGER: usize = 3;
-pub(crate) const LENGTH: usize = 4;
-pub(crate) const EVERY: usize = 5;
-/// The first of the channels.
-pub(crate) const CHANNEL: usize = 6;
-pub(crate) const ARM: usize = CHANNEL + CHANNELS;
-pub(crate) const LOAD_SET: usize = ARM + 1;
-
 /// Last place of the table of signals.
 const LAST: f64 = (COUNT - 1) as f64;
 
-/// Writable values besides the parameters of the program. Whole numbers are counts of four bytes, others floats of eight.
-pub(crate) static CONTROLS: [Parameter; LOAD_SET + 1] = [
-    signal("trace.source", 17.0, "signal that is compared with the threshold, by its place"),
-    Parameter::new(("trace.threshold", ""), [-1e9, 1e9], 0.0, "threshold, in the unit of the source"),
-    Parameter::new(("trace.slope", ""), [0.0, 3.0], 0.0, "0 rising, 1 falling, 2 either, 3 at once").whole(),
-    Parameter::new(
-        ("trace.pre_trigger_samples", ""),
-        [0.0, CAPACITY as f64 - 1.0],
-        100.0,
-        "samples before the trigger; below the length",
-    )
-    .whole(),
-    Parameter::new(("trace.length_samples", ""), [1.0, CAPACITY as f64], 1000.0, "samples in all").whole(),
-    Parameter::new(
-        ("trace.sample_time_cycles", "cycles"),
-        [1.0, 60_000.0],
-        1.0,
-        "cycles of 1 ms from sample to sample",
-    )
-    .whole(),
-    signal("trace.channel_1", 1.0, "signal that is recorded, by its place"),
-    signal("trace.channel_2", 5.0, "signal that is recorded, by its place"),
-    signal("trace.channel_3", 15.0, "signal that is recorded, by its place"),
-    signal("trace.channel_4", 17.0, "signal that is recorded, by its place"),
-    Parameter::new(("trace.arm", ""), [0.0, 1.0], 0.0, "1 arms, 0 disarms; reads 1 until it is ready")
-        .whole(),
-    Parameter::new(("set.load", ""), [0.0, 1.0], 0.0, "1 loads the parameter set that was stored last")
-        .whole(),
-];
+settings::parameters! {
+    /// Writable values besides the parameters of the program. Whole numbers are counts of four bytes, others floats of eight.
+    pub(crate) struct Controls {
+        source as "trace.source": signal(17.0, "signal that is compared with the threshold, by its place"),
+        threshold as "trace.threshold": declare("", [-1e9, 1e9], 0.0, "threshold, in the unit of the source"),
+        slope as "trace.slope": declare("", [0.0, 3.0], 0.0, "0 rising, 1 falling, 2 either, 3 at once").whole(),
+        pre_trigger as "trace.pre_trigger_samples": declare("", [0.0, CAPACITY as f64 - 1.0], 100.0,
+            "samples before the trigger; below the length").whole(),
+        length as "trace.length_samples": declare("", [1.0, CAPACITY as f64], 1000.0, "samples in all").whole(),
+        sample_time as "trace.sample_time_cycles": declare("cycles", [1.0, 60_000.0], 1.0,
+            "cycles of 1 ms from sample to sample").whole(),
+        channel_1 as "trace.channel_1": signal(1.0, "signal that is recorded, by its place"),
+        channel_2 as "trace.channel_2": signal(5.0, "signal that is recorded, by its place"),
+        channel_3 as "trace.channel_3": signal(15.0, "signal that is recorded, by its place"),
+        channel_4 as "trace.channel_4": signal(17.0, "signal that is recorded, by its place"),
+        arm as "trace.arm": declare("", [0.0, 1.0], 0.0, "1 arms, 0 disarms; reads 1 until it is ready").whole(),
+        load_set as "set.load": declare("", [0.0, 1.0], 0.0, "1 loads the parameter set that was stored last").whole(),
+    }
+}
 
-const fn signal(name: &'static str, default: f64, meaning: &'static str) -> Parameter {
-    Parameter::new((name, ""), [0.0, LAST], default, meaning).whole()
+/// The controls in the order of their addresses.
+pub(crate) const CONTROLS: &[Parameter] = Controls::TABLE;
+/// Their values, in this order.
+pub(crate) type ControlValues = [f64; CONTROLS.len()];
+
+const fn signal(default: f64, meaning: &'static str) -> Declaration {
+    declare("", [0.0, LAST], default, meaning).whole()
 }
 
 /// How a control lies in memory.
@@ -129,9 +112,8 @@ pub(crate) struct Trace {
 
 impl Default for Trace {
     fn default() -> Self {
-        let defaults: [f64; CONTROLS.len()] = std::array::from_fn(|place| CONTROLS[place].default);
         Self {
-            settings: Settings::of(&defaults),
+            settings: Settings::of(&Controls::default()),
             state: State::Idle,
             cycles: vec![0; CAPACITY],
             values: std::array::from_fn(|_| vec![0.0; CAPACITY]),
@@ -147,28 +129,28 @@ impl Default for Trace {
 }
 
 impl Settings {
-    fn of(controls: &[f64; CONTROLS.len()]) -> Self {
-        let whole = |place: usize| controls[place] as usize;
+    fn of(controls: &Controls) -> Self {
+        let Controls { channel_1, channel_2, channel_3, channel_4, .. } = *controls;
         Self {
-            source: whole(SOURCE),
-            threshold: controls[THRESHOLD],
-            slope: controls[SLOPE] as u8,
-            pre_trigger: whole(PRE_TRIGGER),
-            length: whole(LENGTH),
-            every: controls[EVERY] as u64,
-            channels: std::array::from_fn(|channel| whole(CHANNEL + channel)),
+            source: controls.source as usize,
+            threshold: controls.threshold,
+            slope: controls.slope as u8,
+            pre_trigger: controls.pre_trigger as usize,
+            length: controls.length as usize,
+            every: controls.sample_time as u64,
+            channels: [channel_1, channel_2, channel_3, channel_4].map(|place| place as usize),
         }
     }
 }
 
 impl Trace {
     /// Whether the pre-trigger is shorter than the buffer.
-    pub(crate) fn can_arm(controls: &[f64; CONTROLS.len()]) -> bool {
-        controls[PRE_TRIGGER] < controls[LENGTH]
+    pub(crate) fn can_arm(controls: &Controls) -> bool {
+        controls.pre_trigger < controls.length
     }
 
     /// Discards all samples and starts with these settings, whose ranges were checked.
-    pub(crate) fn arm(&mut self, controls: &[f64; CONTROLS.len()]) {
+    pub(crate) fn arm(&mut self, controls: &Controls) {
         self.settings = Settings::of(controls);
         self.state = State::Filling;
         (self.next, self.held, self.before, self.due, self.trigger_cycle) = (0, 0, None, 0, 0);
@@ -270,19 +252,15 @@ impl Trace {
 mod tests {
     use super::*;
 
-    fn controls(set: &[(usize, f64)]) -> [f64; CONTROLS.len()] {
-        let mut controls = std::array::from_fn(|place| CONTROLS[place].default);
-        set.iter().for_each(|(place, value)| controls[*place] = *value);
-        controls
+    /// The source is signal 3, and the first channel is that.
+    fn controls() -> Controls {
+        let places = Controls { source: 3.0, channel_1: 3.0, ..Controls::default() };
+        Controls { pre_trigger: 3.0, length: 8.0, threshold: 50.0, ..places }
     }
 
-    /// The source is signal 3, and the first channel is that.
-    fn armed(set: &[(usize, f64)]) -> Trace {
+    fn armed(controls: Controls) -> Trace {
         let mut trace = Trace::default();
-        let mut all =
-            vec![(SOURCE, 3.0), (CHANNEL, 3.0), (PRE_TRIGGER, 3.0), (LENGTH, 8.0), (THRESHOLD, 50.0)];
-        all.extend_from_slice(set);
-        trace.arm(&controls(&all));
+        trace.arm(&controls);
         trace
     }
 
@@ -301,7 +279,7 @@ mod tests {
     #[test]
     fn the_samples_lie_around_the_trigger_whatever_came_before() {
         for start in [0, 40, 10_000] {
-            let mut trace = armed(&[]);
+            let mut trace = armed(controls());
             run(&mut trace, 0..start + 100, |cycle| cycle as f64 - start as f64);
             let trigger = (start + 50) as u32;
             assert_eq!((trace.state, trace.reported()[2]), (State::Ready, trigger));
@@ -312,7 +290,7 @@ mod tests {
 
     #[test]
     fn nothing_triggers_before_the_pre_trigger_is_filled() {
-        let mut trace = armed(&[]);
+        let mut trace = armed(controls());
         run(&mut trace, 0..20, |cycle| if cycle == 2 { 60.0 } else { 0.0 });
         assert_eq!((trace.state, trace.samples()), (State::Armed, 0));
     }
@@ -322,7 +300,7 @@ mod tests {
         // Up at 10, down at 20.
         let pulse = |cycle| if (10..20).contains(&cycle) { 60.0 } else { 0.0 };
         for (slope, trigger) in [(0.0, 10), (1.0, 20), (2.0, 10), (3.0, 3)] {
-            let mut trace = armed(&[(SLOPE, slope)]);
+            let mut trace = armed(Controls { slope, ..controls() });
             run(&mut trace, 0..40, pulse);
             assert_eq!(trace.reported()[2], trigger, "slope {slope}");
         }
@@ -330,7 +308,7 @@ mod tests {
 
     #[test]
     fn samples_are_so_many_cycles_apart_and_say_what_was_skipped() {
-        let mut trace = armed(&[(EVERY, 10.0), (THRESHOLD, 60.0)]);
+        let mut trace = armed(Controls { sample_time: 10.0, threshold: 60.0, ..controls() });
         run(&mut trace, (0..200).filter(|cycle| *cycle != 70), |cycle| cycle as f64);
         assert_eq!(cycles(&trace), [30, 40, 50, 60, 71, 81, 91, 101]);
     }
@@ -338,7 +316,8 @@ mod tests {
     #[test]
     fn the_whole_buffer_can_be_used() {
         let most = CAPACITY as f64;
-        let mut trace = armed(&[(LENGTH, most), (PRE_TRIGGER, most - 1.0), (THRESHOLD, 9000.0)]);
+        let all = Controls { length: most, pre_trigger: most - 1.0, threshold: 9000.0, ..controls() };
+        let mut trace = armed(all);
         run(&mut trace, 0..9100, |cycle| cycle as f64);
         assert_eq!((trace.state, trace.samples()), (State::Ready, CAPACITY));
         assert_eq!((trace.cycle(0), trace.cycle(CAPACITY - 1)), (9000 - CAPACITY as u32 + 1, 9000));
@@ -347,7 +326,8 @@ mod tests {
 
     #[test]
     fn a_pre_trigger_as_long_as_the_buffer_cannot_be_armed() {
-        assert!(!Trace::can_arm(&controls(&[(LENGTH, 100.0), (PRE_TRIGGER, 100.0)])));
-        assert!(Trace::can_arm(&controls(&[(LENGTH, 100.0), (PRE_TRIGGER, 99.0)])));
+        let of = |length, pre_trigger| Controls { length, pre_trigger, ..controls() };
+        assert!(!Trace::can_arm(&of(100.0, 100.0)));
+        assert!(Trace::can_arm(&of(100.0, 99.0)));
     }
 }

@@ -211,7 +211,7 @@ fn a_set_is_stored_once_at_a_time_and_told() {
     bench.refused(&[0xF9, 1, 0, 0], Refusal::Busy);
     assert_eq!(bench.slave.stored(), Some([EVENT, EVENT_STORED, 0, 0, 0, 0, 0, 0]));
     assert_eq!(bench.good(&[0xFD])[0], 0);
-    bench.to(CONTROL + 8 * crate::trace::LOAD_SET as u32);
+    bench.to(CONTROL + 8 * crate::trace::Controls::load_set as u32);
     bench.good(&[0xF0, 4, 1, 0, 0, 0]);
     assert_eq!(bench.log.loads, 1);
 }
