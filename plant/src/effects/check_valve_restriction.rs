@@ -25,10 +25,37 @@
 //! Source: two resistances in series, ISO 6358-3:2014; spring of the non-return valve, Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
+
+/// K_V that stands for no orifice, m^3/h.
+const NO_ORIFICE: f64 = 100.0;
+
+effect_numbers! {
+    struct Numbers {
+        cracking_pa: EffectKey {
+            name: "cracking_pressure_bar",
+            unit: Unit::Bar,
+            max: 1.0,
+            drawn: [0.05, 0.5],
+            meaning: "p_c, pressure difference below which the port stays shut, either way",
+            ..EffectKey::USUAL
+        },
+        orifice_kv_m3_per_h: EffectKey {
+            name: "orifice_kv_m3_per_h",
+            unit: Unit::CubicMetrePerHour,
+            min: 0.2,
+            max: 100.0,
+            drawn: [0.6, 3.0],
+            signed: false,
+            default: Some(NO_ORIFICE),
+            neutral: Some(NO_ORIFICE),
+            meaning: "K_V of the orifice in series; 100 is none",
+        },
+    }
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CheckValveRestriction {
@@ -48,34 +75,14 @@ impl Effect for CheckValveRestriction {
         // Without cracking pressure it is a line resistance.
         defined_by_first: true,
         distinguished_by: &[ManualMeasurement::ConstantVolume],
-        keys: &[
-            EffectKey {
-                name: "cracking_pressure_bar",
-                unit: Unit::Bar,
-                max: 1.0,
-                drawn: [0.05, 0.5],
-                meaning: "p_c, pressure difference below which the port stays shut, either way",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "orifice_kv_m3_per_h",
-                unit: Unit::CubicMetrePerHour,
-                min: 0.2,
-                max: 100.0,
-                drawn: [0.6, 3.0],
-                signed: false,
-                default: Some(100.0),
-                neutral: Some(100.0),
-                meaning: "K_V of the orifice in series; 100 is none",
-            },
-        ],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        let none = Self::SHEET.keys[1].neutral.is_some_and(|kv| numbers[1] >= kv);
-        let conductance = if none { f64::INFINITY } else { numbers[1] * FLOW_PER_KV };
-        CheckValveRestriction { cracking_pa: numbers[0], conductance }
+        let Numbers { cracking_pa, orifice_kv_m3_per_h: kv } = Numbers::of(numbers);
+        let conductance = if kv >= NO_ORIFICE { f64::INFINITY } else { kv * FLOW_PER_KV };
+        CheckValveRestriction { cracking_pa, conductance }
     }
 }
 

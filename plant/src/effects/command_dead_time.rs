@@ -12,14 +12,21 @@
 //!
 //! Source: dead time of sampled loops, Astrom and Wittenmark, Computer-Controlled Systems, 1997; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CommandDeadTime {
-    /// d.
-    pub(crate) delay_s: f64,
+effect_numbers! {
+    pub(crate) struct CommandDeadTime {
+        delay_s: EffectKey {
+            name: "delay_ms",
+            unit: Unit::Millisecond,
+            max: 10.0,
+            drawn: [0.3, 5.0],
+            meaning: "time from the command to its effect on the spool, beside the period it is latched in",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for CommandDeadTime {
@@ -31,19 +38,12 @@ impl Effect for CommandDeadTime {
         source: "dead time of sampled loops, Astrom and Wittenmark 1997; range: textbook prior",
         has_memory: true,
         distinguished_by: &[ManualMeasurement::SpoolSignal],
-        keys: &[EffectKey {
-            name: "delay_ms",
-            unit: Unit::Millisecond,
-            max: 10.0,
-            drawn: [0.3, 5.0],
-            meaning: "time from the command to its effect on the spool, beside the period it is latched in",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        CommandDeadTime { delay_s: numbers[0] }
+        Self::of(numbers)
     }
 }
 

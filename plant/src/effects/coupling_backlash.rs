@@ -14,13 +14,24 @@
 //!
 //! Source: rig-model.md, Masses and linkage, for the contact; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Excitation, Group, ManualMeasurement, PlaceKind, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Excitation, Group, ManualMeasurement, PlaceKind, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CouplingBacklash {
-    pub(crate) gap_m: f64,
+effect_numbers! {
+    pub(crate) struct CouplingBacklash {
+        gap_m: EffectKey {
+            name: "gap_mm",
+            unit: Unit::Millimetre,
+            max: 5.0,
+            drawn: [0.05, 2.0],
+            neutral: Some(0.2),
+            meaning: "s, gap in all, in place of linkage.gap_mm",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for CouplingBacklash {
@@ -33,20 +44,12 @@ impl Effect for CouplingBacklash {
         moves_start_states: true,
         excited_by: Excitation::LinkedRods,
         distinguished_by: &[ManualMeasurement::Uncoupling],
-        keys: &[EffectKey {
-            name: "gap_mm",
-            unit: Unit::Millimetre,
-            max: 5.0,
-            drawn: [0.05, 2.0],
-            neutral: Some(0.2),
-            meaning: "s, gap in all, in place of linkage.gap_mm",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        CouplingBacklash { gap_m: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -15,14 +15,35 @@
 //!
 //! Source: Kelvin-Voigt contact of rig-model.md, Masses and linkage; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Excitation, Group, ManualMeasurement, PlaceKind, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Excitation, Group, ManualMeasurement, PlaceKind, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CouplingCompliance {
-    pub(crate) stiffness_n_per_m: f64,
-    pub(crate) damping_n_s_per_m: f64,
+effect_numbers! {
+    pub(crate) struct CouplingCompliance {
+        stiffness_n_per_m: EffectKey {
+            name: "stiffness_n_per_m",
+            unit: Unit::NewtonPerMetre,
+            min: 10000.0,
+            max: 10000000.0,
+            drawn: [100000.0, 10000000.0],
+            neutral: Some(2e6),
+            meaning: "k', in place of linkage.stiffness_n_per_m",
+            ..EffectKey::USUAL
+        },
+        damping_n_s_per_m: EffectKey {
+            name: "damping_n_s_per_m",
+            unit: Unit::NewtonSecondPerMetre,
+            max: 10000.0,
+            drawn: [500.0, 5000.0],
+            default: Some(2e3),
+            neutral: Some(2e3),
+            meaning: "c', in place of linkage.damping_n_s_per_m",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for CouplingCompliance {
@@ -36,33 +57,12 @@ impl Effect for CouplingCompliance {
         defined_by_first: true,
         excited_by: Excitation::LinkedRods,
         distinguished_by: &[ManualMeasurement::Uncoupling],
-        keys: &[
-            EffectKey {
-                name: "stiffness_n_per_m",
-                unit: Unit::NewtonPerMetre,
-                min: 10000.0,
-                max: 10000000.0,
-                drawn: [100000.0, 10000000.0],
-                neutral: Some(2e6),
-                meaning: "k', in place of linkage.stiffness_n_per_m",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "damping_n_s_per_m",
-                unit: Unit::NewtonSecondPerMetre,
-                max: 10000.0,
-                drawn: [500.0, 5000.0],
-                default: Some(2e3),
-                neutral: Some(2e3),
-                meaning: "c', in place of linkage.damping_n_s_per_m",
-                ..EffectKey::USUAL
-            },
-        ],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        CouplingCompliance { stiffness_n_per_m: numbers[0], damping_n_s_per_m: numbers[1] }
+        Self::of(numbers)
     }
 }
 

@@ -20,14 +20,24 @@
 //! Source: ISO 6358-1:2013, flow-rate characteristics of components, with subsonic index m = 0.5; range: textbook prior for
 //! valves of this size (Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7).
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::single_edge_flow;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct CriticalPressureRatio {
-    pub(crate) critical_ratio: f64,
+effect_numbers! {
+    pub(crate) struct CriticalPressureRatio {
+        critical_ratio: EffectKey {
+            name: "critical_ratio",
+            unit: Unit::One,
+            min: 0.05,
+            max: 0.6,
+            drawn: [0.15, 0.45],
+            neutral: Some(0.5),
+            meaning: "b, the pressure ratio below which the flow is choked",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for CriticalPressureRatio {
@@ -38,21 +48,12 @@ impl Effect for CriticalPressureRatio {
         law: "an edge's flow is the ellipse of ISO 6358 with its own critical pressure ratio b instead of 0.5",
         source: "ISO 6358-1:2013; range: textbook prior (Beater 2007)",
         distinguished_by: &[ManualMeasurement::ConstantVolume],
-        keys: &[EffectKey {
-            name: "critical_ratio",
-            unit: Unit::One,
-            min: 0.05,
-            max: 0.6,
-            drawn: [0.15, 0.45],
-            neutral: Some(0.5),
-            meaning: "b, the pressure ratio below which the flow is choked",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        CriticalPressureRatio { critical_ratio: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -14,13 +14,23 @@
 //! Source: inactive volume at the ends of the stroke, Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336; range:
 //! textbook prior.
 
-use super::sheet::{Effect, EffectKey, Excitation, Group, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct DeadVolume {
-    pub(crate) volume_m3: f64,
+effect_numbers! {
+    pub(crate) struct DeadVolume {
+        volume_m3: EffectKey {
+            name: "volume_cm3",
+            unit: Unit::CubicCentimetre,
+            min: 5.0,
+            max: 200.0,
+            drawn: [5.0, 60.0],
+            neutral: Some(20.0),
+            meaning: "V_own of each chamber, in place of cylinder.dead_volume_cm3",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for DeadVolume {
@@ -31,21 +41,12 @@ impl Effect for DeadVolume {
         source: "inactive volume, Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
         excited_by: Excitation::NearEnd,
         distinguished_by: &[ManualMeasurement::ConstantVolume, ManualMeasurement::PressedEnds],
-        keys: &[EffectKey {
-            name: "volume_cm3",
-            unit: Unit::CubicCentimetre,
-            min: 5.0,
-            max: 200.0,
-            drawn: [5.0, 60.0],
-            neutral: Some(20.0),
-            meaning: "V_own of each chamber, in place of cylinder.dead_volume_cm3",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        DeadVolume { volume_m3: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -26,17 +26,46 @@
 //! Source: [Neugebauer 2011] is DOI 10.2478/v10180-011-0014-6; adjusting screw and check valve as makers of cylinders draw
 //! them; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct EndCushion {
-    pub(crate) cushion_kv_m3_per_h: f64,
-    /// Length of the cushion before each end.
-    pub(crate) length_m: f64,
-    pub(crate) stop_stiffness_n_per_m: f64,
+effect_numbers! {
+    pub(crate) struct EndCushion {
+        cushion_kv_m3_per_h: EffectKey {
+            name: "cushion_kv_m3_per_h",
+            unit: Unit::CubicMetrePerHour,
+            min: 0.005,
+            max: 100.0,
+            drawn: [0.02, 0.3],
+            neutral: Some(f64::INFINITY),
+            meaning: "K_V of the cushion's orifice; a chamber that fills goes past it",
+            ..EffectKey::USUAL
+        },
+        length_m: EffectKey {
+            name: "length_mm",
+            unit: Unit::Millimetre,
+            min: 1.0,
+            max: 50.0,
+            drawn: [10.0, 25.0],
+            signed: false,
+            default: Some(20.0),
+            neutral: None,
+            meaning: "length of the cushion before each end",
+        },
+        stop_stiffness_n_per_m: EffectKey {
+            name: "stop_stiffness_n_per_m",
+            unit: Unit::NewtonPerMetre,
+            min: 10000.0,
+            max: 5000000.0,
+            drawn: [100000.0, 2000000.0],
+            signed: false,
+            default: Some(1e6),
+            neutral: None,
+            meaning: "k_stop of the elastic stop over the last millimetre",
+        },
+    }
 }
 
 impl Effect for EndCushion {
@@ -49,49 +78,12 @@ impl Effect for EndCushion {
         nonlinear_in_amplitude: true,
         excited_by: Excitation::IntoEnd,
         distinguished_by: &[ManualMeasurement::PressedEnds],
-        keys: &[
-            EffectKey {
-                name: "cushion_kv_m3_per_h",
-                unit: Unit::CubicMetrePerHour,
-                min: 0.005,
-                max: 100.0,
-                drawn: [0.02, 0.3],
-                neutral: Some(f64::INFINITY),
-                meaning: "K_V of the cushion's orifice; a chamber that fills goes past it",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "length_mm",
-                unit: Unit::Millimetre,
-                min: 1.0,
-                max: 50.0,
-                drawn: [10.0, 25.0],
-                signed: false,
-                default: Some(20.0),
-                neutral: None,
-                meaning: "length of the cushion before each end",
-            },
-            EffectKey {
-                name: "stop_stiffness_n_per_m",
-                unit: Unit::NewtonPerMetre,
-                min: 10000.0,
-                max: 5000000.0,
-                drawn: [100000.0, 2000000.0],
-                signed: false,
-                default: Some(1e6),
-                neutral: None,
-                meaning: "k_stop of the elastic stop over the last millimetre",
-            },
-        ],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        EndCushion {
-            cushion_kv_m3_per_h: numbers[0],
-            length_m: numbers[1],
-            stop_stiffness_n_per_m: numbers[2],
-        }
+        Self::of(numbers)
     }
 }
 

@@ -11,14 +11,24 @@
 //! Source: none, it is made for the tests.
 
 use super::OpenBalance;
-use super::sheet::{Effect, EffectKey, Group, Law, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-/// The number of this effect at one place.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Example {
-    amount: f64,
+effect_numbers! {
+    /// The number of this effect at one place.
+    pub(crate) struct Example {
+        amount: EffectKey {
+            name: "amount",
+            unit: Unit::One,
+            min: -1.0,
+            max: 1.0,
+            drawn: [0.1, 1.0],
+            signed: true,
+            meaning: "size of the terms",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for Example {
@@ -28,21 +38,12 @@ impl Effect for Example {
         laws: &[Law::Air, Law::StoredAir, Law::Friction, Law::Force],
         law: "a constant in every open balance",
         source: "none, made for the tests",
-        keys: &[EffectKey {
-            name: "amount",
-            unit: Unit::One,
-            min: -1.0,
-            max: 1.0,
-            drawn: [0.1, 1.0],
-            signed: true,
-            meaning: "size of the terms",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        Example { amount: numbers[0] }
+        Self::of(numbers)
     }
 
     fn open_term(&self, balance: &OpenBalance<'_>) -> Option<f64> {

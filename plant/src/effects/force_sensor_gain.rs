@@ -12,13 +12,25 @@
 //!
 //! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Element, Excitation, Group, ManualMeasurement, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Element, Excitation, Group, ManualMeasurement, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ForceSensorGain {
-    pub(crate) gain: f64,
+effect_numbers! {
+    pub(crate) struct ForceSensorGain {
+        gain: EffectKey {
+            name: "gain_percent",
+            unit: Unit::Percent,
+            min: -30.0,
+            max: 30.0,
+            drawn: [0.5, 8.0],
+            signed: true,
+            meaning: "g, what it reads too much, of the force",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for ForceSensorGain {
@@ -30,21 +42,12 @@ impl Effect for ForceSensorGain {
         excited_by: Excitation::LinkedRods,
         sensor_error: Some((SensorError::Gain, Some(Element::Force))),
         distinguished_by: &[ManualMeasurement::KnownWeight],
-        keys: &[EffectKey {
-            name: "gain_percent",
-            unit: Unit::Percent,
-            min: -30.0,
-            max: 30.0,
-            drawn: [0.5, 8.0],
-            signed: true,
-            meaning: "g, what it reads too much, of the force",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        ForceSensorGain { gain: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -12,14 +12,25 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ForceSensorOffset {
-    /// What the reading has above the truth, N.
-    pub(crate) offset_n: f64,
+effect_numbers! {
+    pub(crate) struct ForceSensorOffset {
+        offset_n: EffectKey {
+            name: "offset_n",
+            unit: Unit::Newton,
+            min: -100.0,
+            max: 100.0,
+            drawn: [1.0, 20.0],
+            signed: true,
+            meaning: "o, what it reads too much",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for ForceSensorOffset {
@@ -30,21 +41,12 @@ impl Effect for ForceSensorOffset {
         source: "zero error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Offset, Some(Element::Force))),
         distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::KnownWeight],
-        keys: &[EffectKey {
-            name: "offset_n",
-            unit: Unit::Newton,
-            min: -100.0,
-            max: 100.0,
-            drawn: [1.0, 20.0],
-            signed: true,
-            meaning: "o, what it reads too much",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        ForceSensorOffset { offset_n: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -15,13 +15,23 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); viscous friction that differs with the
 //! direction was found on the EMPS axis [Janot, Gautier, Brunot 2019]; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct FrictionAsymmetry {
-    pub(crate) asymmetry: f64,
+effect_numbers! {
+    pub(crate) struct FrictionAsymmetry {
+        asymmetry: EffectKey {
+            name: "asymmetry_percent",
+            unit: Unit::Percent,
+            min: -90.0,
+            max: 90.0,
+            drawn: [5.0, 60.0],
+            signed: true,
+            meaning: "a: times 1 + a as the rod extends, times 1 - a as it retracts",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for FrictionAsymmetry {
@@ -32,21 +42,12 @@ impl Effect for FrictionAsymmetry {
         law: "sliding, break-away and viscous friction differ with the direction",
         source: "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, Automatica 30(7); range: effects.md, textbook prior",
         distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::Pulling],
-        keys: &[EffectKey {
-            name: "asymmetry_percent",
-            unit: Unit::Percent,
-            min: -90.0,
-            max: 90.0,
-            drawn: [5.0, 60.0],
-            signed: true,
-            meaning: "a: times 1 + a as the rod extends, times 1 - a as it retracts",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        FrictionAsymmetry { asymmetry: numbers[0] }
+        Self::of(numbers)
     }
 }
 

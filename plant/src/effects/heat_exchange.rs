@@ -23,14 +23,28 @@
 //! Almeida 2006, Reduced-order thermodynamic models for servo-pneumatic actuator chambers, Proc. IMechE I 220; range:
 //! textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
+effect_numbers! {
+    struct Numbers {
+        coefficient_w_per_m2_k: EffectKey {
+            name: "coefficient_w_per_m2_k",
+            unit: Unit::WattPerSquareMetreKelvin,
+            min: 1.0,
+            max: 100000.0,
+            drawn: [10.0, 150.0],
+            neutral: Some(f64::INFINITY),
+            meaning: "h, heat transfer coefficient to the wetted wall",
+            ..EffectKey::USUAL
+        },
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct HeatExchange {
-    /// h.
-    coefficient_w_per_m2_k: f64,
+    numbers: Numbers,
     /// T0.
     wall_k: f64,
     /// p_N.
@@ -57,22 +71,13 @@ impl Effect for HeatExchange {
         source: "energy balance, Beater 2007, Carneiro and de Almeida 2006; range: textbook prior",
         has_memory: true,
         distinguished_by: &[ManualMeasurement::LockedHold, ManualMeasurement::ConstantVolume],
-        keys: &[EffectKey {
-            name: "coefficient_w_per_m2_k",
-            unit: Unit::WattPerSquareMetreKelvin,
-            min: 1.0,
-            max: 100000.0,
-            drawn: [10.0, 150.0],
-            neutral: Some(f64::INFINITY),
-            meaning: "h, heat transfer coefficient to the wetted wall",
-            ..EffectKey::USUAL
-        }],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
         HeatExchange {
-            coefficient_w_per_m2_k: numbers[0],
+            numbers: Numbers::of(numbers),
             wall_k: rig.gas().temperature_k,
             normal_pa: rig.gas().normal_pressure_pa,
         }
@@ -91,7 +96,8 @@ impl HeatExchange {
     pub(crate) fn thermal_rate_w(&self, chamber: ChamberHeat) -> f64 {
         let carried_k = if chamber.flow_m3_per_s > 0.0 { self.wall_k } else { chamber.temperature_k };
         let carried = self.normal_pa * chamber.flow_m3_per_s * (GAMMA * carried_k / self.wall_k - 1.0);
-        let heat_w = self.coefficient_w_per_m2_k * chamber.wetted_m2 * (self.wall_k - chamber.temperature_k);
+        let heat_w =
+            self.numbers.coefficient_w_per_m2_k * chamber.wetted_m2 * (self.wall_k - chamber.temperature_k);
         carried + self.work_share() * heat_w
     }
 
@@ -103,7 +109,7 @@ impl HeatExchange {
     /// m c_v / (h S), with which the temperature of a chamber with the stored air p V relaxes, s.
     pub(crate) fn relaxation_s(&self, stored_j: f64, chamber: ChamberHeat) -> f64 {
         let mass_kg = stored_j / (GAS_J_PER_KG_K * chamber.temperature_k);
-        mass_kg * HEAT_J_PER_KG_K / (self.coefficient_w_per_m2_k * chamber.wetted_m2)
+        mass_kg * HEAT_J_PER_KG_K / (self.numbers.coefficient_w_per_m2_k * chamber.wetted_m2)
     }
 }
 

@@ -14,14 +14,23 @@
 //!
 //! Source: Newton's second law; range: effects.md, textbook prior (5 kg at 45 degrees are 35 N, added weights more).
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Inclination {
-    /// Force in +x of the rig, N.
-    pub(crate) force_n: f64,
+effect_numbers! {
+    pub(crate) struct Inclination {
+        force_n: EffectKey {
+            name: "force_n",
+            unit: Unit::Newton,
+            min: -200.0,
+            max: 200.0,
+            drawn: [2.0, 50.0],
+            signed: true,
+            meaning: "F_g, force in +x of the rig",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for Inclination {
@@ -32,21 +41,12 @@ impl Effect for Inclination {
         law: "a constant force along x: gravity on an inclined axis, a hanging load",
         source: "gravity along the axis; range: effects.md, textbook prior",
         distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::KnownWeight],
-        keys: &[EffectKey {
-            name: "force_n",
-            unit: Unit::Newton,
-            min: -200.0,
-            max: 200.0,
-            drawn: [2.0, 50.0],
-            signed: true,
-            meaning: "F_g, force in +x of the rig",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        Inclination { force_n: numbers[0] }
+        Self::of(numbers)
     }
 }
 

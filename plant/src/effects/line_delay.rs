@@ -15,13 +15,21 @@
 //! Source: Richer and Hurmuzlu 2000, part I, DOI 10.1115/1.1286336, connecting tubes (delay l / a and attenuation); range:
 //! textbook prior, tubes of 0.5 to 4 m.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct LineDelay {
-    pub(crate) length_m: f64,
+effect_numbers! {
+    pub(crate) struct LineDelay {
+        length_m: EffectKey {
+            name: "length_m",
+            unit: Unit::Metre,
+            max: 5.0,
+            drawn: [0.5, 4.0],
+            meaning: "l, length of each line between valve and chamber; 2.9 ms per metre",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for LineDelay {
@@ -33,19 +41,12 @@ impl Effect for LineDelay {
         source: "Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior",
         has_memory: true,
         distinguished_by: &[ManualMeasurement::PortPressure, ManualMeasurement::SpoolSignal],
-        keys: &[EffectKey {
-            name: "length_m",
-            unit: Unit::Metre,
-            max: 5.0,
-            drawn: [0.5, 4.0],
-            meaning: "l, length of each line between valve and chamber; 2.9 ms per metre",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        LineDelay { length_m: numbers[0] }
+        Self::of(numbers)
     }
 }
 

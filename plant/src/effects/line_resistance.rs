@@ -18,10 +18,23 @@
 //! Source: Darcy and Weisbach for gases, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, tubes; range:
 //! textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
+
+effect_numbers! {
+    struct Numbers {
+        drop_pa: EffectKey {
+            name: "drop_bar",
+            unit: Unit::Bar,
+            max: 1.0,
+            drawn: [0.05, 0.5],
+            meaning: "dp, drop at the full flow of the supply edge into a chamber at half the supply pressure",
+            ..EffectKey::USUAL
+        },
+    }
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct LineResistance {
@@ -37,22 +50,15 @@ impl Effect for LineResistance {
         law: "the lines between valve and chambers are resistances: the drop grows with the flow squared and with 1/p",
         source: "pipe friction, Beater 2007; range: textbook prior",
         distinguished_by: &[ManualMeasurement::PortPressure, ManualMeasurement::ConstantVolume],
-        keys: &[EffectKey {
-            name: "drop_bar",
-            unit: Unit::Bar,
-            max: 1.0,
-            drawn: [0.05, 0.5],
-            meaning: "dp, drop at the full flow of the supply edge into a chamber at half the supply pressure",
-            ..EffectKey::USUAL
-        }],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
         let reference_pa = rig.supply().pressure_pa / 2.0;
         let full_flow = full_flow_m3_per_s(rig);
-        let resistance =
-            if full_flow > 0.0 { numbers[0] * reference_pa / (full_flow * full_flow) } else { 0.0 };
+        let Numbers { drop_pa } = Numbers::of(numbers);
+        let resistance = if full_flow > 0.0 { drop_pa * reference_pa / (full_flow * full_flow) } else { 0.0 };
         LineResistance { resistance }
     }
 }

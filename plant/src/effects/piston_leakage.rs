@@ -16,8 +16,14 @@
 //! chambers also in Richer and Hurmuzlu 2000, DOI 10.1115/1.1286336; range: textbook prior.
 
 use super::laminar_gap::LaminarGap;
-use super::sheet::{Effect, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
+
+effect_numbers! {
+    struct Numbers {
+        leakage_m3_per_s: LaminarGap::KEY,
+    }
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PistonLeakage {
@@ -32,12 +38,12 @@ impl Effect for PistonLeakage {
         law: "laminar leakage past the piston seal, from chamber to chamber",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
         distinguished_by: &[ManualMeasurement::LockedHold],
-        keys: &[LaminarGap::KEY],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PistonLeakage { gap: LaminarGap::of(numbers[0]) }
+        PistonLeakage { gap: LaminarGap::of(Numbers::of(numbers).leakage_m3_per_s) }
     }
 }
 

@@ -18,15 +18,39 @@
 //! effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
+effect_numbers! {
+    struct Numbers {
+        spring_n: EffectKey {
+            name: "spring_n",
+            unit: Unit::Newton,
+            min: -200.0,
+            max: 200.0,
+            drawn: [2.0, 60.0],
+            signed: true,
+            meaning: "F_c, force at x = 0, falling in a straight line to its negative at the other end; positive centres",
+            ..EffectKey::USUAL
+        },
+        ripple_n: EffectKey {
+            name: "ripple_n",
+            unit: Unit::Newton,
+            min: -100.0,
+            max: 100.0,
+            drawn: [2.0, 30.0],
+            default: Some(0.0),
+            meaning: "F_r, amplitude of the cogging",
+            ..EffectKey::USUAL
+        },
+        pitch_m: Ripple::PITCH,
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionDependentForce {
-    pub(crate) spring_n: f64,
-    /// F_r and P, amplitude and period of the cogging.
-    ripple: Ripple,
+    numbers: Numbers,
     /// L/2 of the rig.
     pub(crate) half_stroke_m: f64,
 }
@@ -39,45 +63,21 @@ impl Effect for PositionDependentForce {
         law: "a force over x that does not flip with the velocity: hose or cable spring, cogging",
         source: "Hooke's law, cogging as a sine of its pitch; range: effects.md, textbook prior",
         distinguished_by: &[ManualMeasurement::Tilting, ManualMeasurement::Pulling],
-        keys: &[
-            EffectKey {
-                name: "spring_n",
-                unit: Unit::Newton,
-                min: -200.0,
-                max: 200.0,
-                drawn: [2.0, 60.0],
-                signed: true,
-                meaning: "F_c, force at x = 0, falling in a straight line to its negative at the other end; positive centres",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "ripple_n",
-                unit: Unit::Newton,
-                min: -100.0,
-                max: 100.0,
-                drawn: [2.0, 30.0],
-                default: Some(0.0),
-                meaning: "F_r, amplitude of the cogging",
-                ..EffectKey::USUAL
-            },
-            Ripple::PITCH,
-        ],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
-        PositionDependentForce {
-            spring_n: numbers[0],
-            ripple: Ripple { amplitude_n: numbers[1], pitch_m: numbers[2] },
-            half_stroke_m: rig.cylinder().stroke_m / 2.0,
-        }
+        PositionDependentForce { numbers: Numbers::of(numbers), half_stroke_m: rig.cylinder().stroke_m / 2.0 }
     }
 }
 
 impl PositionDependentForce {
     /// Force in +x of the rig at this position, m; N.
     pub(crate) fn term(&self, position_m: f64) -> f64 {
-        -self.spring_n * line(self.half_stroke_m, position_m) + self.ripple.at(position_m)
+        let Numbers { spring_n, ripple_n, pitch_m } = self.numbers;
+        let ripple = Ripple { amplitude_n: ripple_n, pitch_m };
+        -spring_n * line(self.half_stroke_m, position_m) + ripple.at(position_m)
     }
 }
 

@@ -23,18 +23,70 @@
 //! and range: effects.md, textbook prior.
 
 use super::over_stroke::{Ripple, line};
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
+effect_numbers! {
+    struct Numbers {
+        bump_n: EffectKey {
+            name: "bump_n",
+            unit: Unit::Newton,
+            min: -100.0,
+            max: 100.0,
+            drawn: [2.0, 40.0],
+            meaning: "F_b, height of the bump",
+            ..EffectKey::USUAL
+        },
+        centre_m: EffectKey {
+            name: "centre_mm",
+            unit: Unit::Millimetre,
+            max: 500.0,
+            drawn: [100.0, 400.0],
+            default: Some(250.0),
+            neutral: None,
+            meaning: "c, extension at which the bump is highest",
+            ..EffectKey::USUAL
+        },
+        width_m: EffectKey {
+            name: "width_mm",
+            unit: Unit::Millimetre,
+            min: 5.0,
+            max: 500.0,
+            drawn: [30.0, 120.0],
+            signed: false,
+            default: Some(60.0),
+            neutral: None,
+            meaning: "w, half-width of the bump at 1/e",
+        },
+        slope_n: EffectKey {
+            name: "slope_n",
+            unit: Unit::Newton,
+            min: -100.0,
+            max: 100.0,
+            drawn: [2.0, 40.0],
+            signed: true,
+            default: Some(0.0),
+            neutral: Some(0.0),
+            meaning: "F_s, growth from mid-stroke to the rod fully out",
+        },
+        ripple_n: EffectKey {
+            name: "ripple_n",
+            unit: Unit::Newton,
+            min: -100.0,
+            max: 100.0,
+            drawn: [2.0, 20.0],
+            default: Some(0.0),
+            meaning: "F_r, amplitude of the ripple",
+            ..EffectKey::USUAL
+        },
+        pitch_m: Ripple::PITCH,
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct PositionDependentFriction {
-    pub(crate) bump_n: f64,
-    pub(crate) centre_m: f64,
-    pub(crate) width_m: f64,
-    pub(crate) slope_n: f64,
-    /// F_r and P, amplitude and period of the ripple.
-    ripple: Ripple,
+    numbers: Numbers,
     /// L/2 of the rig.
     pub(crate) half_stroke_m: f64,
 }
@@ -49,70 +101,13 @@ impl Effect for PositionDependentFriction {
         // A bump elsewhere does not resemble the one in the middle.
         also_screened: &[-0.45, 0.45],
         distinguished_by: &[ManualMeasurement::Pulling],
-        keys: &[
-            EffectKey {
-                name: "bump_n",
-                unit: Unit::Newton,
-                min: -100.0,
-                max: 100.0,
-                drawn: [2.0, 40.0],
-                meaning: "F_b, height of the bump",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "centre_mm",
-                unit: Unit::Millimetre,
-                max: 500.0,
-                drawn: [100.0, 400.0],
-                default: Some(250.0),
-                neutral: None,
-                meaning: "c, extension at which the bump is highest",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "width_mm",
-                unit: Unit::Millimetre,
-                min: 5.0,
-                max: 500.0,
-                drawn: [30.0, 120.0],
-                signed: false,
-                default: Some(60.0),
-                neutral: None,
-                meaning: "w, half-width of the bump at 1/e",
-            },
-            EffectKey {
-                name: "slope_n",
-                unit: Unit::Newton,
-                min: -100.0,
-                max: 100.0,
-                drawn: [2.0, 40.0],
-                signed: true,
-                default: Some(0.0),
-                neutral: Some(0.0),
-                meaning: "F_s, growth from mid-stroke to the rod fully out",
-            },
-            EffectKey {
-                name: "ripple_n",
-                unit: Unit::Newton,
-                min: -100.0,
-                max: 100.0,
-                drawn: [2.0, 20.0],
-                default: Some(0.0),
-                meaning: "F_r, amplitude of the ripple",
-                ..EffectKey::USUAL
-            },
-            Ripple::PITCH,
-        ],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
         PositionDependentFriction {
-            bump_n: numbers[0],
-            centre_m: numbers[1],
-            width_m: numbers[2],
-            slope_n: numbers[3],
-            ripple: Ripple { amplitude_n: numbers[4], pitch_m: numbers[5] },
+            numbers: Numbers::of(numbers),
             half_stroke_m: rig.cylinder().stroke_m / 2.0,
         }
     }
@@ -121,9 +116,11 @@ impl Effect for PositionDependentFriction {
 impl PositionDependentFriction {
     /// What the levels of friction have above their baseline at this extension, m; N.
     pub(crate) fn term(&self, extension_m: f64) -> f64 {
-        let from_bump = (extension_m - self.centre_m) / self.width_m;
-        let bump_n = self.bump_n * libm::exp(-from_bump * from_bump);
-        bump_n + self.slope_n * line(self.half_stroke_m, extension_m) + self.ripple.at(extension_m)
+        let Numbers { bump_n, centre_m, width_m, slope_n, ripple_n, pitch_m } = self.numbers;
+        let from_bump = (extension_m - centre_m) / width_m;
+        let bump_n = bump_n * libm::exp(-from_bump * from_bump);
+        let ripple = Ripple { amplitude_n: ripple_n, pitch_m };
+        bump_n + slope_n * line(self.half_stroke_m, extension_m) + ripple.at(extension_m)
     }
 }
 

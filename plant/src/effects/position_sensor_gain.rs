@@ -12,13 +12,25 @@
 //!
 //! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PositionSensorGain {
-    pub(crate) gain: f64,
+effect_numbers! {
+    pub(crate) struct PositionSensorGain {
+        gain: EffectKey {
+            name: "gain_percent",
+            unit: Unit::Percent,
+            min: -5.0,
+            max: 5.0,
+            drawn: [0.1, 1.0],
+            signed: true,
+            meaning: "g, what it reads too much, of the position",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for PositionSensorGain {
@@ -29,21 +41,12 @@ impl Effect for PositionSensorGain {
         source: "gain error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Gain, Some(Element::Position))),
         distinguished_by: &[ManualMeasurement::PressedEnds],
-        keys: &[EffectKey {
-            name: "gain_percent",
-            unit: Unit::Percent,
-            min: -5.0,
-            max: 5.0,
-            drawn: [0.1, 1.0],
-            signed: true,
-            meaning: "g, what it reads too much, of the position",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PositionSensorGain { gain: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -18,13 +18,23 @@
 //! Source: first-order lag, filter of the transducer; range 0.5 to 8 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Element, Group, Law, ManualMeasurement, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Element, Group, Law, ManualMeasurement, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PositionSensorLag {
-    pub(crate) time_constant_s: f64,
+effect_numbers! {
+    pub(crate) struct PositionSensorLag {
+        time_constant_s: EffectKey {
+            name: "time_constant_ms",
+            unit: Unit::Millisecond,
+            max: 20.0,
+            drawn: [0.5, 8.0],
+            meaning: "tau, time constant of the position sensor",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for PositionSensorLag {
@@ -37,19 +47,12 @@ impl Effect for PositionSensorLag {
         has_memory: true,
         sensor_error: Some((SensorError::Delay, Some(Element::Position))),
         distinguished_by: &[ManualMeasurement::PositionSensor],
-        keys: &[EffectKey {
-            name: "time_constant_ms",
-            unit: Unit::Millisecond,
-            max: 20.0,
-            drawn: [0.5, 8.0],
-            meaning: "tau, time constant of the position sensor",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PositionSensorLag { time_constant_s: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -12,14 +12,25 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Element, Group, ManualMeasurement, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PositionSensorOffset {
-    /// What the reading has above the truth, m.
-    pub(crate) offset_m: f64,
+effect_numbers! {
+    pub(crate) struct PositionSensorOffset {
+        offset_m: EffectKey {
+            name: "offset_mm",
+            unit: Unit::Millimetre,
+            min: -10.0,
+            max: 10.0,
+            drawn: [0.1, 2.0],
+            signed: true,
+            meaning: "o, what it reads too much, beside the load sensor's own offset",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for PositionSensorOffset {
@@ -30,21 +41,12 @@ impl Effect for PositionSensorOffset {
         source: "zero error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Offset, Some(Element::Position))),
         distinguished_by: &[ManualMeasurement::PressedEnds, ManualMeasurement::Uncoupling],
-        keys: &[EffectKey {
-            name: "offset_mm",
-            unit: Unit::Millimetre,
-            min: -10.0,
-            max: 10.0,
-            drawn: [0.1, 2.0],
-            signed: true,
-            meaning: "o, what it reads too much, beside the load sensor's own offset",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PositionSensorOffset { offset_m: numbers[0] }
+        Self::of(numbers)
     }
 }
 

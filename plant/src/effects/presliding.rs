@@ -57,7 +57,7 @@
 //! state elastoplastic friction models", IEEE Trans. Automatic Control 47(5). Fading form of s_1: ours, the simplest that is
 //! passive and gives psi in closed form. v_s and the range of s_0: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
@@ -73,9 +73,19 @@ const LEAST_LEVEL_N: f64 = 1e-2;
 /// Steps of Newton's method, after one for the prediction: the test `the_balance_is_solved` says what they leave.
 const NEWTON_STEPS: u32 = 4;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Presliding {
-    pub(crate) stiffness_n_per_m: f64,
+effect_numbers! {
+    pub(crate) struct Presliding {
+        stiffness_n_per_m: EffectKey {
+            name: "stiffness_n_per_m",
+            unit: Unit::NewtonPerMetre,
+            min: 30000.0,
+            max: 30000000.0,
+            drawn: [100000.0, 10000000.0],
+            neutral: Some(f64::INFINITY),
+            meaning: "s_0, stiffness of the bristles",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 /// State of one piston on its bristles, along its own extension.
@@ -112,21 +122,12 @@ impl Effect for Presliding {
         has_memory: true,
         excited_by: Excitation::Creeping,
         distinguished_by: &[ManualMeasurement::Uncoupling, ManualMeasurement::Pulling],
-        keys: &[EffectKey {
-            name: "stiffness_n_per_m",
-            unit: Unit::NewtonPerMetre,
-            min: 30000.0,
-            max: 30000000.0,
-            drawn: [100000.0, 10000000.0],
-            neutral: Some(f64::INFINITY),
-            meaning: "s_0, stiffness of the bristles",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        Presliding { stiffness_n_per_m: numbers[0] }
+        Self::of(numbers)
     }
 }
 

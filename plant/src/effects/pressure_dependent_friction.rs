@@ -15,14 +15,21 @@
 //! Source: growth of a pneumatic cylinder's friction with its pressures, measured: Tran, Yanada, "Dynamic friction behaviors
 //! of pneumatic cylinders", Intelligent Control and Automation 4(2), 2013; linear form and range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PressureDependentFriction {
-    /// c, friction force per pascal of the sum.
-    pub(crate) slope_n_per_pa: f64,
+effect_numbers! {
+    pub(crate) struct PressureDependentFriction {
+        slope_n_per_pa: EffectKey {
+            name: "slope_n_per_bar",
+            unit: Unit::NewtonPerBar,
+            max: 20.0,
+            drawn: [0.2, 10.0],
+            meaning: "c, friction force per bar of the sum",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for PressureDependentFriction {
@@ -33,19 +40,12 @@ impl Effect for PressureDependentFriction {
         law: "friction grows with the sum of the gauge pressures that press the seals on",
         source: "Tran, Yanada 2013, Intelligent Control and Automation 4(2); linear form and range: effects.md, textbook prior",
         distinguished_by: &[ManualMeasurement::Pulling],
-        keys: &[EffectKey {
-            name: "slope_n_per_bar",
-            unit: Unit::NewtonPerBar,
-            max: 20.0,
-            drawn: [0.2, 10.0],
-            meaning: "c, friction force per bar of the sum",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PressureDependentFriction { slope_n_per_pa: numbers[0] }
+        Self::of(numbers)
     }
 }
 

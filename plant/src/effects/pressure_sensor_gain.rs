@@ -12,13 +12,25 @@
 //!
 //! Source: gain error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, ManualMeasurement, PlaceKind, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Group, ManualMeasurement, PlaceKind, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PressureSensorGain {
-    pub(crate) gain: f64,
+effect_numbers! {
+    pub(crate) struct PressureSensorGain {
+        gain: EffectKey {
+            name: "gain_percent",
+            unit: Unit::Percent,
+            min: -10.0,
+            max: 10.0,
+            drawn: [0.25, 2.0],
+            signed: true,
+            meaning: "g, what it reads too much, of the absolute pressure",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for PressureSensorGain {
@@ -30,21 +42,12 @@ impl Effect for PressureSensorGain {
         source: "gain error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Gain, None)),
         distinguished_by: &[ManualMeasurement::Venting, ManualMeasurement::Tilting],
-        keys: &[EffectKey {
-            name: "gain_percent",
-            unit: Unit::Percent,
-            min: -10.0,
-            max: 10.0,
-            drawn: [0.25, 2.0],
-            signed: true,
-            meaning: "g, what it reads too much, of the absolute pressure",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PressureSensorGain { gain: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -18,13 +18,23 @@
 //! Source: first-order lag, sense line as one resistance and one volume; range 1 to 10 ms: effects.md, textbook prior.
 
 use super::first_order;
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PressureSensorLag {
-    pub(crate) time_constant_s: f64,
+effect_numbers! {
+    pub(crate) struct PressureSensorLag {
+        time_constant_s: EffectKey {
+            name: "time_constant_ms",
+            unit: Unit::Millisecond,
+            max: 20.0,
+            drawn: [1.0, 10.0],
+            meaning: "tau, time constant of the pressure sensor",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for PressureSensorLag {
@@ -38,19 +48,12 @@ impl Effect for PressureSensorLag {
         has_memory: true,
         sensor_error: Some((SensorError::Delay, None)),
         distinguished_by: &[ManualMeasurement::PortPressure],
-        keys: &[EffectKey {
-            name: "time_constant_ms",
-            unit: Unit::Millisecond,
-            max: 20.0,
-            drawn: [1.0, 10.0],
-            meaning: "tau, time constant of the pressure sensor",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PressureSensorLag { time_constant_s: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -12,14 +12,25 @@
 //!
 //! Source: zero error of a transducer's data sheet; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, ManualMeasurement, PlaceKind, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Group, ManualMeasurement, PlaceKind, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct PressureSensorOffset {
-    /// What the reading has above the truth, Pa.
-    pub(crate) offset_pa: f64,
+effect_numbers! {
+    pub(crate) struct PressureSensorOffset {
+        offset_pa: EffectKey {
+            name: "offset_mbar",
+            unit: Unit::Millibar,
+            min: -500.0,
+            max: 500.0,
+            drawn: [10.0, 100.0],
+            signed: true,
+            meaning: "o, what it reads too much",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for PressureSensorOffset {
@@ -31,21 +42,12 @@ impl Effect for PressureSensorOffset {
         source: "zero error of a transducer; range: effects.md, textbook prior",
         sensor_error: Some((SensorError::Offset, None)),
         distinguished_by: &[ManualMeasurement::Venting, ManualMeasurement::Tilting],
-        keys: &[EffectKey {
-            name: "offset_mbar",
-            unit: Unit::Millibar,
-            min: -500.0,
-            max: 500.0,
-            drawn: [10.0, 100.0],
-            signed: true,
-            meaning: "o, what it reads too much",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        PressureSensorOffset { offset_pa: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -17,14 +17,37 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30(7), 1994, on rising static friction; logarithmic growth:
 //! Dieterich, "Time-dependent friction in rocks", J. Geophysical Research 77(20), 1972; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
+effect_numbers! {
+    struct Numbers {
+        growth: EffectKey {
+            name: "growth_percent",
+            unit: Unit::Percent,
+            max: 100.0,
+            drawn: [10.0, 50.0],
+            meaning: "g, growth of the break-away force after 10 s at rest",
+            ..EffectKey::USUAL
+        },
+        onset_s: EffectKey {
+            name: "onset_s",
+            unit: Unit::Second,
+            min: 0.001,
+            max: 5.0,
+            drawn: [0.05, 0.5],
+            signed: false,
+            default: Some(0.1),
+            neutral: None,
+            meaning: "t_0 of ln(1 + t / t_0), after which the growth is logarithmic",
+        },
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RestTimeDependentBreakAway {
-    pub(crate) growth: f64,
-    pub(crate) onset_s: f64,
+    numbers: Numbers,
     /// F_stat g / ln(1 + 10 s / t_0).
     pub(crate) per_fold_n: f64,
 }
@@ -38,35 +61,15 @@ impl Effect for RestTimeDependentBreakAway {
         source: "Armstrong-Helouvry et al. 1994, Automatica 30(7); Dieterich 1972; range: effects.md, textbook prior",
         has_memory: true,
         distinguished_by: &[ManualMeasurement::Pulling],
-        keys: &[
-            EffectKey {
-                name: "growth_percent",
-                unit: Unit::Percent,
-                max: 100.0,
-                drawn: [10.0, 50.0],
-                meaning: "g, growth of the break-away force after 10 s at rest",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "onset_s",
-                unit: Unit::Second,
-                min: 0.001,
-                max: 5.0,
-                drawn: [0.05, 0.5],
-                signed: false,
-                default: Some(0.1),
-                neutral: None,
-                meaning: "t_0 of ln(1 + t / t_0), after which the growth is logarithmic",
-            },
-        ],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
-        let [growth, onset_s] = [numbers[0], numbers[1]];
+        let numbers @ Numbers { growth, onset_s } = Numbers::of(numbers);
         let folds = libm::log1p(REFERENCE_S / onset_s);
         let per_fold_n = rig.friction().break_away_force_n * growth / folds;
-        RestTimeDependentBreakAway { growth, onset_s, per_fold_n }
+        RestTimeDependentBreakAway { numbers, per_fold_n }
     }
 }
 
@@ -76,7 +79,7 @@ const REFERENCE_S: f64 = 10.0;
 impl RestTimeDependentBreakAway {
     /// What the break-away force has above its baseline after this time at rest, s, not negative; N.
     pub(crate) fn term(&self, rest_s: f64) -> f64 {
-        self.per_fold_n * libm::log1p(rest_s / self.onset_s)
+        self.per_fold_n * libm::log1p(rest_s / self.numbers.onset_s)
     }
 }
 

@@ -14,8 +14,14 @@
 //! Source: laminar gap flow of a gas, Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::laminar_gap::LaminarGap;
-use super::sheet::{Effect, Group, Law, ManualMeasurement, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
+
+effect_numbers! {
+    struct Numbers {
+        leakage_m3_per_s: LaminarGap::KEY,
+    }
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct RodLeakage {
@@ -31,12 +37,12 @@ impl Effect for RodLeakage {
         law: "laminar leakage to the atmosphere: past the rod seal out of b, past the cap's static seal out of a",
         source: "laminar gap flow, Beater 2007; range: textbook prior",
         distinguished_by: &[ManualMeasurement::LockedHold],
-        keys: &[LaminarGap::KEY],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        RodLeakage { gap: LaminarGap::of(numbers[0]) }
+        RodLeakage { gap: LaminarGap::of(Numbers::of(numbers).leakage_m3_per_s) }
     }
 }
 

@@ -116,6 +116,28 @@ impl EffectKey {
     }
 }
 
+/// Declares the numbers of an effect, each by a field in SI and its [`EffectKey`]: a struct with these fields, `KEYS` for its
+/// sheet, and `of`, which reads the struct from numbers in their order.
+macro_rules! effect_numbers {
+    ($(#[$about:meta])* $visibility:vis struct $name:ident { $($field:ident: $key:expr,)+ }) => {
+        $(#[$about])*
+        #[derive(Debug, Clone, Copy, PartialEq)]
+        $visibility struct $name { $($visibility $field: f64,)+ }
+
+        impl $name {
+            const KEYS: &'static [EffectKey] = &[$($key),+];
+
+            fn of(numbers: &[f64]) -> Self {
+                let &[$($field),+] = numbers else {
+                    panic!("{} numbers for {} keys", numbers.len(), Self::KEYS.len())
+                };
+                Self { $($field),+ }
+            }
+        }
+    };
+}
+pub(super) use effect_numbers;
+
 /// Groups of the catalogue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {

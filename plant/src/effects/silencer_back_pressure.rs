@@ -17,10 +17,36 @@
 //! 2007, DOI 10.1007/978-3-540-69471-7; range: textbook prior.
 
 use super::node::Node;
-use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 use crate::valve::FLOW_PER_KV;
+
+effect_numbers! {
+    struct Numbers {
+        kv_ratio: EffectKey {
+            name: "silencer_kv_ratio",
+            unit: Unit::One,
+            min: 0.1,
+            max: 100.0,
+            drawn: [0.3, 3.0],
+            neutral: Some(f64::INFINITY),
+            meaning: "n, K_V of the silencer in units of the exhaust edge's largest",
+            ..EffectKey::USUAL
+        },
+        volume_m3: EffectKey {
+            name: "volume_cm3",
+            unit: Unit::CubicCentimetre,
+            min: 5.0,
+            max: 1000.0,
+            drawn: [30.0, 100.0],
+            signed: false,
+            default: Some(60.0),
+            neutral: None,
+            meaning: "volume between the exhaust edges and the silencer",
+        },
+    }
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SilencerBackPressure {
@@ -38,36 +64,15 @@ impl Effect for SilencerBackPressure {
         has_memory: true,
         excited_by: Excitation::Fast,
         distinguished_by: &[ManualMeasurement::ConstantVolume],
-        keys: &[
-            EffectKey {
-                name: "silencer_kv_ratio",
-                unit: Unit::One,
-                min: 0.1,
-                max: 100.0,
-                drawn: [0.3, 3.0],
-                neutral: Some(f64::INFINITY),
-                meaning: "n, K_V of the silencer in units of the exhaust edge's largest",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "volume_cm3",
-                unit: Unit::CubicCentimetre,
-                min: 5.0,
-                max: 1000.0,
-                drawn: [30.0, 100.0],
-                signed: false,
-                default: Some(60.0),
-                neutral: None,
-                meaning: "volume between the exhaust edges and the silencer",
-            },
-        ],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
         let kv_max = rig.valve().kv_exhaust_m3_per_h.into_iter().fold(0.0, f64::max);
-        let conductance = numbers[0] * kv_max * FLOW_PER_KV;
-        let node = Node { conductance, volume_m3: numbers[1], normal_pa: rig.gas().normal_pressure_pa };
+        let Numbers { kv_ratio, volume_m3 } = Numbers::of(numbers);
+        let conductance = kv_ratio * kv_max * FLOW_PER_KV;
+        let node = Node { conductance, volume_m3, normal_pa: rig.gas().normal_pressure_pa };
         SilencerBackPressure { node }
     }
 }

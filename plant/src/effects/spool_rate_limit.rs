@@ -14,14 +14,23 @@
 //!
 //! Source: slew rate of saturated actuators, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SpoolRateLimit {
-    /// Largest |ds/dt|.
-    pub(crate) rate_per_s: f64,
+effect_numbers! {
+    pub(crate) struct SpoolRateLimit {
+        rate_per_s: EffectKey {
+            name: "rate_per_s",
+            unit: Unit::PerSecond,
+            min: 5.0,
+            max: 2000.0,
+            drawn: [20.0, 200.0],
+            neutral: Some(f64::INFINITY),
+            meaning: "largest |ds/dt|; full opening counts 1",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for SpoolRateLimit {
@@ -34,21 +43,12 @@ impl Effect for SpoolRateLimit {
         nonlinear_in_amplitude: true,
         has_memory: true,
         distinguished_by: &[ManualMeasurement::SpoolSignal],
-        keys: &[EffectKey {
-            name: "rate_per_s",
-            unit: Unit::PerSecond,
-            min: 5.0,
-            max: 2000.0,
-            drawn: [20.0, 200.0],
-            neutral: Some(f64::INFINITY),
-            meaning: "largest |ds/dt|; full opening counts 1",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        SpoolRateLimit { rate_per_s: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -20,15 +20,34 @@
 //! Source: Beater, Pneumatic Drives, 2007, DOI 10.1007/978-3-540-69471-7, valves with position-controlled spool; range:
 //! textbook prior around the 100 Hz of the rig's valve.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct SpoolSecondOrder {
-    /// f, w / 2 pi.
-    pub(crate) natural_frequency_hz: f64,
-    pub(crate) damping: f64,
+effect_numbers! {
+    pub(crate) struct SpoolSecondOrder {
+        natural_frequency_hz: EffectKey {
+            name: "natural_frequency_hz",
+            unit: Unit::Hertz,
+            min: 20.0,
+            max: 400.0,
+            drawn: [60.0, 120.0],
+            neutral: None,
+            meaning: "f, natural frequency of the spool with its control",
+            ..EffectKey::USUAL
+        },
+        damping: EffectKey {
+            name: "damping",
+            unit: Unit::One,
+            min: 0.2,
+            max: 1.5,
+            drawn: [0.5, 0.9],
+            signed: false,
+            default: Some(0.7),
+            neutral: None,
+            meaning: "z, share of critical damping",
+        },
+    }
 }
 
 impl Effect for SpoolSecondOrder {
@@ -40,34 +59,12 @@ impl Effect for SpoolSecondOrder {
         source: "Beater 2007, position-controlled spools; range: textbook prior",
         has_memory: true,
         distinguished_by: &[ManualMeasurement::SpoolSignal],
-        keys: &[
-            EffectKey {
-                name: "natural_frequency_hz",
-                unit: Unit::Hertz,
-                min: 20.0,
-                max: 400.0,
-                drawn: [60.0, 120.0],
-                neutral: None,
-                meaning: "f, natural frequency of the spool with its control",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "damping",
-                unit: Unit::One,
-                min: 0.2,
-                max: 1.5,
-                drawn: [0.5, 0.9],
-                signed: false,
-                default: Some(0.7),
-                neutral: None,
-                meaning: "z, share of critical damping",
-            },
-        ],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        SpoolSecondOrder { natural_frequency_hz: numbers[0], damping: numbers[1] }
+        Self::of(numbers)
     }
 }
 

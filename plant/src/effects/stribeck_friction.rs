@@ -16,15 +16,38 @@
 //! Source: Armstrong-Helouvry, Dupont, Canudas de Wit, "A survey of models, analysis tools and compensation methods for the
 //! control of machines with friction", Automatica 30(7), 1994, with d = 1 and 2 in use; range of v_s: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Excitation, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
+effect_numbers! {
+    struct Numbers {
+        velocity_m_per_s: EffectKey {
+            name: "velocity_mm_per_s",
+            unit: Unit::MillimetrePerSecond,
+            min: 0.01,
+            max: 200.0,
+            drawn: [2.0, 50.0],
+            meaning: "v_s, Stribeck velocity",
+            ..EffectKey::USUAL
+        },
+        exponent: EffectKey {
+            name: "exponent",
+            unit: Unit::One,
+            min: 0.5,
+            max: 3.0,
+            drawn: [0.8, 2.0],
+            signed: false,
+            default: Some(2.0),
+            neutral: None,
+            meaning: "d, how sharply it falls: 1 exponential, 2 Gaussian",
+        },
+    }
+}
+
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct StribeckFriction {
-    pub(crate) velocity_m_per_s: f64,
-    /// d, how sharply friction falls.
-    pub(crate) exponent: f64,
+    numbers: Numbers,
     /// F_stat - F_sli of the rig.
     pub(crate) excess_n: f64,
 }
@@ -39,36 +62,14 @@ impl Effect for StribeckFriction {
         nonlinear_in_amplitude: true,
         excited_by: Excitation::Creeping,
         distinguished_by: &[ManualMeasurement::Pulling],
-        keys: &[
-            EffectKey {
-                name: "velocity_mm_per_s",
-                unit: Unit::MillimetrePerSecond,
-                min: 0.01,
-                max: 200.0,
-                drawn: [2.0, 50.0],
-                meaning: "v_s, Stribeck velocity",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "exponent",
-                unit: Unit::One,
-                min: 0.5,
-                max: 3.0,
-                drawn: [0.8, 2.0],
-                signed: false,
-                default: Some(2.0),
-                neutral: None,
-                meaning: "d, how sharply it falls: 1 exponential, 2 Gaussian",
-            },
-        ],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
         let friction = rig.friction();
         StribeckFriction {
-            velocity_m_per_s: numbers[0],
-            exponent: numbers[1],
+            numbers: Numbers::of(numbers),
             excess_n: friction.break_away_force_n - friction.sliding_force_n,
         }
     }
@@ -80,7 +81,8 @@ impl StribeckFriction {
         if speed_m_per_s == 0.0 {
             return self.excess_n;
         }
-        self.excess_n * libm::exp(-libm::pow(speed_m_per_s / self.velocity_m_per_s, self.exponent))
+        let Numbers { velocity_m_per_s, exponent } = self.numbers;
+        self.excess_n * libm::exp(-libm::pow(speed_m_per_s / velocity_m_per_s, exponent))
     }
 }
 

@@ -20,9 +20,33 @@
 
 use super::line_resistance::full_flow_m3_per_s;
 use super::node::Node;
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
+
+effect_numbers! {
+    struct Numbers {
+        droop_pa: EffectKey {
+            name: "droop_bar",
+            unit: Unit::Bar,
+            max: 2.0,
+            drawn: [0.1, 1.0],
+            meaning: "dp, fall of the node while one full supply edge draws steadily",
+            ..EffectKey::USUAL
+        },
+        volume_m3: EffectKey {
+            name: "volume_cm3",
+            unit: Unit::CubicCentimetre,
+            min: 50.0,
+            max: 10000.0,
+            drawn: [200.0, 2000.0],
+            signed: false,
+            default: Some(500.0),
+            neutral: None,
+            meaning: "volume of the node",
+        },
+    }
+}
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct SupplyDroop {
@@ -40,32 +64,12 @@ impl Effect for SupplyDroop {
         source: "ISO 6953-2:2015, Beater 2007; range: textbook prior",
         has_memory: true,
         distinguished_by: &[ManualMeasurement::ConstantVolume],
-        keys: &[
-            EffectKey {
-                name: "droop_bar",
-                unit: Unit::Bar,
-                max: 2.0,
-                drawn: [0.1, 1.0],
-                meaning: "dp, fall of the node while one full supply edge draws steadily",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "volume_cm3",
-                unit: Unit::CubicCentimetre,
-                min: 50.0,
-                max: 10000.0,
-                drawn: [200.0, 2000.0],
-                signed: false,
-                default: Some(500.0),
-                neutral: None,
-                meaning: "volume of the node",
-            },
-        ],
+        keys: Numbers::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], rig: &RigParameters) -> Self {
-        let (droop_pa, volume_m3) = (numbers[0], numbers[1]);
+        let Numbers { droop_pa, volume_m3 } = Numbers::of(numbers);
         let supply_pa = rig.supply().pressure_pa;
         let fall_pa = droop_pa.max(LEAST_DROOP_PA).min(supply_pa / 2.0);
         let conductance = full_flow_m3_per_s(rig) / (fall_pa * (supply_pa - fall_pa)).sqrt();

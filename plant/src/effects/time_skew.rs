@@ -15,13 +15,23 @@
 //!
 //! Source: definition; range: effects.md, textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, SensorError, Sheet};
+use super::sheet::{
+    Effect, EffectKey, Group, Law, ManualMeasurement, PlaceKind, SensorError, Sheet, effect_numbers,
+};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct TimeSkew {
-    pub(crate) delay_s: f64,
+effect_numbers! {
+    pub(crate) struct TimeSkew {
+        delay_s: EffectKey {
+            name: "delay_ms",
+            unit: Unit::Millisecond,
+            max: 10.0,
+            drawn: [0.3, 6.0],
+            meaning: "d, how old the value is when it is sampled",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for TimeSkew {
@@ -39,19 +49,12 @@ impl Effect for TimeSkew {
             ManualMeasurement::PortPressure,
             ManualMeasurement::Uncoupling,
         ],
-        keys: &[EffectKey {
-            name: "delay_ms",
-            unit: Unit::Millisecond,
-            max: 10.0,
-            drawn: [0.3, 6.0],
-            meaning: "d, how old the value is when it is sampled",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        TimeSkew { delay_s: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -19,16 +19,34 @@
 //! Source: flow gain of a spool with shaped or round ports, Merritt, Hydraulic Control Systems, 1967, chapter 5; bend and
 //! ratio are this catalogue's own shape; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ValveCharacteristic {
-    /// c, share.
-    pub(crate) bend: f64,
-    /// r, share.
-    pub(crate) edge_ratio: f64,
+effect_numbers! {
+    pub(crate) struct ValveCharacteristic {
+        bend: EffectKey {
+            name: "bend_percent",
+            unit: Unit::Percent,
+            min: -40.0,
+            max: 40.0,
+            drawn: [5.0, 25.0],
+            signed: true,
+            meaning: "c of K_V(o + 2 c o (1 - o)): more passes at half opening if positive",
+            ..EffectKey::USUAL
+        },
+        edge_ratio: EffectKey {
+            name: "edge_ratio_percent",
+            unit: Unit::Percent,
+            min: -40.0,
+            max: 40.0,
+            drawn: [5.0, 25.0],
+            signed: true,
+            default: Some(0.0),
+            neutral: Some(0.0),
+            meaning: "r: supply edges times 1 + r/2, exhaust edges times 1 - r/2",
+        },
+    }
 }
 
 impl Effect for ValveCharacteristic {
@@ -39,34 +57,12 @@ impl Effect for ValveCharacteristic {
         law: "the K_V tables are bent over the opening, or supply and exhaust edges stand in another ratio",
         source: "spool port shapes, Merritt 1967 ch. 5; range: textbook prior",
         distinguished_by: &[ManualMeasurement::ConstantVolume],
-        keys: &[
-            EffectKey {
-                name: "bend_percent",
-                unit: Unit::Percent,
-                min: -40.0,
-                max: 40.0,
-                drawn: [5.0, 25.0],
-                signed: true,
-                meaning: "c of K_V(o + 2 c o (1 - o)): more passes at half opening if positive",
-                ..EffectKey::USUAL
-            },
-            EffectKey {
-                name: "edge_ratio_percent",
-                unit: Unit::Percent,
-                min: -40.0,
-                max: 40.0,
-                drawn: [5.0, 25.0],
-                signed: true,
-                default: Some(0.0),
-                neutral: Some(0.0),
-                meaning: "r: supply edges times 1 + r/2, exhaust edges times 1 - r/2",
-            },
-        ],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        ValveCharacteristic { bend: numbers[0], edge_ratio: numbers[1] }
+        Self::of(numbers)
     }
 }
 

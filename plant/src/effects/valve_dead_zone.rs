@@ -15,14 +15,21 @@
 //! Source: lapped spool, Merritt, Hydraulic Control Systems, 1967, chapter 5; Beater, Pneumatic Drives, 2007, DOI
 //! 10.1007/978-3-540-69471-7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ValveDeadZone {
-    /// d, share of full opening.
-    pub(crate) dead_zone: f64,
+effect_numbers! {
+    pub(crate) struct ValveDeadZone {
+        dead_zone: EffectKey {
+            name: "dead_zone_percent",
+            unit: Unit::Percent,
+            max: 20.0,
+            drawn: [0.5, 5.0],
+            meaning: "d, of full opening, beside the tables' own dead band",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for ValveDeadZone {
@@ -34,19 +41,12 @@ impl Effect for ValveDeadZone {
         source: "lapped spool, Merritt 1967 ch. 5; range: textbook prior (Beater 2007)",
         nonlinear_in_amplitude: true,
         distinguished_by: &[ManualMeasurement::ConstantVolume],
-        keys: &[EffectKey {
-            name: "dead_zone_percent",
-            unit: Unit::Percent,
-            max: 20.0,
-            drawn: [0.5, 5.0],
-            meaning: "d, of full opening, beside the tables' own dead band",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        ValveDeadZone { dead_zone: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -14,14 +14,21 @@
 //!
 //! Source: play operator, Krasnosel'skii and Pokrovskii, Systems with Hysteresis, 1989; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ValveHysteresis {
-    /// h, share of full command.
-    pub(crate) half_width: f64,
+effect_numbers! {
+    pub(crate) struct ValveHysteresis {
+        half_width: EffectKey {
+            name: "half_width_percent",
+            unit: Unit::Percent,
+            max: 10.0,
+            drawn: [0.2, 3.0],
+            meaning: "h, of full command",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for ValveHysteresis {
@@ -34,19 +41,12 @@ impl Effect for ValveHysteresis {
         nonlinear_in_amplitude: true,
         has_memory: true,
         distinguished_by: &[ManualMeasurement::SpoolSignal],
-        keys: &[EffectKey {
-            name: "half_width_percent",
-            unit: Unit::Percent,
-            max: 10.0,
-            drawn: [0.2, 3.0],
-            meaning: "h, of full command",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        ValveHysteresis { half_width: numbers[0] }
+        Self::of(numbers)
     }
 }
 

@@ -15,14 +15,21 @@
 //! Source: centre leakage of a spool with clearance, Merritt, Hydraulic Control Systems, 1967, chapter 5; range: textbook
 //! prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ValveNullLeakage {
-    /// e, share of the edge's largest K_V.
-    pub(crate) share: f64,
+effect_numbers! {
+    pub(crate) struct ValveNullLeakage {
+        share: EffectKey {
+            name: "leakage_percent",
+            unit: Unit::Percent,
+            max: 10.0,
+            drawn: [0.2, 2.0],
+            meaning: "floor of each edge, of its own largest K_V",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for ValveNullLeakage {
@@ -33,19 +40,12 @@ impl Effect for ValveNullLeakage {
         law: "every edge keeps a floor of its largest K_V",
         source: "spool clearance, Merritt 1967 ch. 5; range: textbook prior",
         distinguished_by: &[ManualMeasurement::LockedHold],
-        keys: &[EffectKey {
-            name: "leakage_percent",
-            unit: Unit::Percent,
-            max: 10.0,
-            drawn: [0.2, 2.0],
-            meaning: "floor of each edge, of its own largest K_V",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        ValveNullLeakage { share: numbers[0] }
+        Self::of(numbers)
     }
 }
 

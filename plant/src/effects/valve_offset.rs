@@ -12,14 +12,23 @@
 //!
 //! Source: null bias, Merritt, Hydraulic Control Systems, 1967, chapter 7; range: textbook prior.
 
-use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet};
+use super::sheet::{Effect, EffectKey, Group, Law, ManualMeasurement, Sheet, effect_numbers};
 use crate::parameters::RigParameters;
 use crate::parameters::table::Unit;
 
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct ValveOffset {
-    /// u_0, share of full command.
-    pub(crate) offset: f64,
+effect_numbers! {
+    pub(crate) struct ValveOffset {
+        offset: EffectKey {
+            name: "offset_percent",
+            unit: Unit::Percent,
+            min: -10.0,
+            max: 10.0,
+            drawn: [0.5, 3.0],
+            signed: true,
+            meaning: "u_0, of full command",
+            ..EffectKey::USUAL
+        },
+    }
 }
 
 impl Effect for ValveOffset {
@@ -30,21 +39,12 @@ impl Effect for ValveOffset {
         law: "the spool's null lies beside the command's",
         source: "null bias, Merritt 1967 ch. 7; range: textbook prior",
         distinguished_by: &[ManualMeasurement::LockedHold],
-        keys: &[EffectKey {
-            name: "offset_percent",
-            unit: Unit::Percent,
-            min: -10.0,
-            max: 10.0,
-            drawn: [0.5, 3.0],
-            signed: true,
-            meaning: "u_0, of full command",
-            ..EffectKey::USUAL
-        }],
+        keys: Self::KEYS,
         ..Sheet::USUAL
     };
 
     fn new(numbers: &[f64], _rig: &RigParameters) -> Self {
-        ValveOffset { offset: numbers[0] }
+        Self::of(numbers)
     }
 }
 
