@@ -38,9 +38,8 @@ impl Inputs {
         let parameters = RigParameters::from_toml(&rig_toml, &rig.display().to_string())
             .map_err(|error| RunError::Input(error.to_string()))?;
         wire_limits::check(&parameters).map_err(|misfit| {
-            let line = line_of_key(&rig_toml, misfit.table, misfit.key);
-            let line = line.map_or_else(String::new, |line| format!(":{line}"));
-            RunError::Input(format!("{}{line}: {misfit}", rig.display()))
+            let line = parameters.line(&format!("{}.{}", misfit.table, misfit.key));
+            RunError::Input(format!("{}:{line}: {misfit}", rig.display()))
         })?;
         let experiment_toml = experiment.map(read).transpose()?;
         let scene = match (&experiment_toml, experiment) {
@@ -99,14 +98,26 @@ fn named_by(experiment: Option<&Path>, scene: &Scene) -> Option<PathBuf> {
     scene.sealed.as_ref().map(|sealed| folder.join(sealed))
 }
 
-/// Line, from 1, of `key` in `[table]`; `None` for a default.
-fn line_of_key(text: &str, table: &str, key: &str) -> Option<usize> {
-    let head = text.lines().position(|line| line.trim() == format!("[{table}]"))?;
-    let within = text.lines().skip(head).position(|line| line.trim_start().starts_with(key))?;
-    Some(head + within + 1)
-}
-
 fn read(path: &Path) -> Result<String, RunError> {
     std::fs::read_to_string(path)
         .map_err(|error| RunError::Input(format!("cannot read {}: {error}", path.display())))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misfit_is_reported_with_the_line_of_its_key_however_the_file_is_written() {
+        let text = RigParameters::BASELINE_TOML
+            .replacen("[sensors]", "[ sensors ] # of both axes", 1)
+            .replacen("position_range_mm = 500", "\"position_range_mm\" = 800", 1);
+        let line = text.lines().position(|line| line.starts_with("\"position_range_mm\"")).unwrap() + 1;
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("rig.toml");
+        std::fs::write(&file, text).unwrap();
+        let error = Inputs::read(&file, None, None).err().expect("it does not fit the wire").to_string();
+        let place = format!("{}:{line}: sensors.position_range_mm: ", file.display());
+        assert!(error.contains(&place), "{error}");
+    }
 }

@@ -125,6 +125,16 @@ impl RigParameters {
         &self.entries.entry(table, name).numbers
     }
 
+    /// Line of a key, `table.key`, in the rig file, from 1.
+    ///
+    /// # Panics
+    /// If the table of parameters holds no such key: a typing error.
+    #[must_use]
+    pub fn line(&self, path: &str) -> usize {
+        let (table, name) = path.split_once('.').unwrap_or((path, ""));
+        self.entries.entry(table, name).line
+    }
+
     /// The same rig with one effect switched on, or with other numbers where it is on already.
     ///
     /// `place` is `drive`, `drive.a` and so on; `numbers` are keys of the effect's sheet in the file's units; keys that are
