@@ -1,6 +1,7 @@
 //! Times of a calendar in a column, ISO 8601 as RFC 3339 has it: `2026-11-27T14:05:03.250+01:00`, with a space for the T too.
 //!
 //! Days since 1970 by the proleptic Gregorian calendar [Hinnant, chrono-compatible low-level date algorithms, days_from_civil].
+//! The crate humantime refuses years before 1970, to which the unset clock of a logger falls, and reads no zone but Z.
 
 use toml::value::Datetime;
 
