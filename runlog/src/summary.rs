@@ -5,6 +5,7 @@
 //! and fields whose absence means something are options, which the emulator always writes.
 
 use crate::controller_report::{ControllerFigures, IgnoredFrames};
+use crate::event::EventKind;
 use crate::run_folder::{FileError, read_json};
 use crate::timing_recorder::{CommandAges, FlightFigures, TimingFigures};
 use protocol::bus::BusCounters;
@@ -169,8 +170,16 @@ impl Summary {
 pub struct RecordedEvent {
     /// The rig's cycle.
     pub cycle: u64,
-    /// Its name, or an object of its name and its details.
+    /// Its name, or an object of its name and its details. It stays as it stands: a kind of another version must not be lost.
     pub kind: Value,
+}
+
+impl RecordedEvent {
+    /// The kind as its type; `None` for one that this version does not write.
+    #[must_use]
+    pub fn known_kind(&self) -> Option<EventKind> {
+        EventKind::deserialize(&self.kind).ok()
+    }
 }
 
 /// Frames that arrived at the rig and were ignored.
@@ -406,6 +415,7 @@ pub struct JudgedBound {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::event::Event;
 
     #[test]
     fn a_rehearsals_files_are_read_as_those_of_a_run() {
@@ -440,6 +450,15 @@ mod tests {
         assert_eq!(again["command_age_cycles"]["drive"]["1"], 2);
         assert!(["axes", "overruns", "wakeup_ns"].iter().all(|key| again.get(*key).is_none()), "{again}");
         assert_eq!(serde_json::from_value::<JoinedSummary>(again).unwrap(), joined);
+    }
+
+    #[test]
+    fn a_recorded_event_is_read_as_the_kind_that_it_was_written_as() {
+        let event: Event = Event { cycle: 7, kind: EventKind::Skipped { cycles: 3 } };
+        let recorded: RecordedEvent = serde_json::from_value(serde_json::to_value(&event).unwrap()).unwrap();
+        assert_eq!((recorded.cycle, recorded.known_kind()), (event.cycle, Some(event.kind)));
+        let other = RecordedEvent { kind: "of-another-version".into(), ..recorded };
+        assert_eq!(other.known_kind(), None);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::files::RunFiles;
 use crate::model::Event;
+use runlog::event::EventKind;
 use runlog::flight_dump;
 use runlog::run_folder::BUS_LOG;
 use runlog::summary::{RecordedEvent, Summary};
@@ -64,6 +65,10 @@ fn rig_events(summary: &Summary, first: u64, last: u64) -> Vec<String> {
 
 fn in_words(event: &RecordedEvent, near: &std::ops::RangeInclusive<u64>) -> Option<String> {
     let cycle = Some(event.cycle).filter(|cycle| near.contains(cycle))?;
+    if matches!(event.known_kind(), Some(EventKind::Skipped { .. })) {
+        return None;
+    }
+    // Kinds of other versions are shown too: name and details as they stand in the file.
     let (name, details) = match &event.kind {
         Value::String(name) => (name.as_str(), String::new()),
         Value::Object(kind) => {
@@ -71,13 +76,14 @@ fn in_words(event: &RecordedEvent, near: &std::ops::RangeInclusive<u64>) -> Opti
         }
         _ => return None,
     };
-    (name != "skipped").then(|| format!("Cycle {cycle}: {name} {details}").trim_end().to_owned())
+    Some(format!("Cycle {cycle}: {name} {details}").trim_end().to_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::{explain, made_up};
+    use runlog::Axis;
     use serde_json::json;
 
     #[test]
@@ -85,13 +91,15 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut run = made_up::stalled(500, "emulator", 100, 3_700_000);
         run.folder = folder.path().into();
+        let event = |cycle, kind: EventKind| json!(runlog::event::Event { cycle, kind });
         made_up::edit_summary(&mut run, |summary| {
-            summary["event_count"] = json!(4);
+            summary["event_count"] = json!(5);
             summary["events"] = json!([
-                { "cycle": 20, "kind": "emergency_stop" },
-                { "cycle": 99, "kind": { "skipped": { "cycles": 3 } } },
-                { "cycle": 103, "kind": { "stale": { "axis": "drive" } } },
-                { "cycle": 112, "kind": "bus_lost" },
+                event(20, EventKind::EmergencyStop),
+                event(99, EventKind::Skipped { cycles: 3 }),
+                event(103, EventKind::CommandStale(Axis::Drive)),
+                { "cycle": 104, "kind": { "of-another-version": { "axis": "drive" } } },
+                event(112, EventKind::BusLost),
             ]);
         });
         for name in ["emulator-0000000103-overrun", "controller-0000000103-late", "emulator-0000000300-late"]
@@ -105,7 +113,12 @@ mod tests {
         add(&mut event, &run);
         assert_eq!(event.dump.as_deref(), Some("flight/emulator-0000000103-overrun"));
         assert_eq!(event.frames, BTreeMap::from([("110".to_owned(), 1), ("120".to_owned(), 2)]));
-        assert_eq!(event.rig_events, ["Cycle 103: stale {\"axis\":\"drive\"}", "Cycle 112: bus_lost"]);
+        let reported = [
+            "Cycle 103: command-stale \"drive\"",
+            "Cycle 104: of-another-version {\"axis\":\"drive\"}",
+            "Cycle 112: bus-lost",
+        ];
+        assert_eq!(event.rig_events, reported);
     }
 
     #[test]
