@@ -12,7 +12,7 @@ use realtime::machine::Hypervisor;
 use realtime::{Grant, Machine};
 use runlog::conditions::Conditions;
 use runlog::controller_report::ControllerReport;
-use runlog::flight_dump;
+use runlog::flight_dump::{self, DumpName, EVENT_JSON, TIMING_CSV};
 use runlog::ping_pong::PingPongFile;
 use runlog::process::{HLOG_END, Process};
 use runlog::run_folder::{
@@ -178,27 +178,20 @@ impl RunFiles {
 
     /// What the flight recorder's dumps tell, and their rows for processes that did not write all of theirs.
     fn take_flights(&mut self) {
-        let Ok(entries) = std::fs::read_dir(self.folder.join(flight_dump::FOLDER)) else { return };
-        let mut names: Vec<_> =
-            entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok()).collect();
-        names.sort();
         let mut taken: BTreeMap<String, BTreeMap<u64, CycleTiming>> = BTreeMap::new();
-        for name in names {
-            // PROCESS-CYCLE-TRIGGER, and a process may have a dash in its name.
-            let Some(process) = name.rsplitn(3, '-').nth(2) else { continue };
-            if Process::of_name(process).is_none() {
+        for (folder, DumpName { process, .. }) in flight_dump::list(&self.folder).unwrap_or_default() {
+            if Process::of_name(&process).is_none() {
                 continue;
             }
-            let process = process.to_owned();
-            let dump = format!("{}/{name}", flight_dump::FOLDER);
-            let event = self.parse(&format!("{dump}/event.json"), |text| serde_json::from_str(text));
+            let dump = format!("{}/{folder}", flight_dump::FOLDER);
+            let event = self.parse(&format!("{dump}/{EVENT_JSON}"), |text| serde_json::from_str(text));
             if let Some(flight_dump::Event { cycle, late_ns, .. }) = event {
                 self.recorded_late_ns.entry(process.clone()).or_default().insert(cycle, late_ns);
             }
             if self.rows.contains_key(&process) {
                 continue;
             }
-            let rows = self.parse(&format!("{dump}/timing.csv"), timing::read).unwrap_or_default();
+            let rows = self.parse(&format!("{dump}/{TIMING_CSV}"), timing::read).unwrap_or_default();
             taken.entry(process).or_default().extend(rows.into_iter().map(|row| (row.cycle, row)));
         }
         for (process, rows) in taken {

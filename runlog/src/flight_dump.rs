@@ -1,7 +1,7 @@
 //! What a flight recorder leaves of an event: a folder with the cycles, the frames and what happened.
 //!
 //! ```text
-//!   flight/controller-0000012345-late/
+//!   flight/controller-0000012345-late/     PROCESS-CYCLE-TRIGGER
 //!     timing.csv    cycles around the event, as in the timing tables
 //!     bus.log       frames that the process took and sent meanwhile, in candump's form
 //!     event.json    what happened; written last, so that a folder with it is whole
@@ -11,12 +11,17 @@ use crate::candump::{self, FrameRecord};
 use crate::run_folder::{BUS_LOG, named, write_json};
 use crate::timing::{CycleTiming, write_head, write_row};
 use serde::{Deserialize, Serialize};
+use std::fmt;
 use std::fs;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// Folder of the dumps in a run's folder.
 pub const FOLDER: &str = "flight";
+/// What happened, in the folder of a dump.
+pub const EVENT_JSON: &str = "event.json";
+/// Cycles around the event, in the folder of a dump.
+pub const TIMING_CSV: &str = "timing.csv";
 
 /// What happened, and when; as it stands in `event.json`.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,15 +50,56 @@ pub struct Event {
 impl Event {
     /// Name of its folder.
     #[must_use]
-    pub fn name(&self) -> String {
-        name(&self.process, self.cycle, &self.trigger)
+    pub fn name(&self) -> DumpName {
+        DumpName { process: self.process.clone(), cycle: self.cycle, trigger: self.trigger.clone() }
     }
 }
 
-/// Name of the folder of an event.
-#[must_use]
-pub fn name(process: &str, cycle: u64, trigger: &str) -> String {
-    format!("{process}-{cycle:010}-{trigger}")
+/// Name of a dump's folder: PROCESS-CYCLE-TRIGGER.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct DumpName {
+    /// As [`Event::process`]; it may have a dash.
+    pub process: String,
+    /// As [`Event::cycle`].
+    pub cycle: u64,
+    /// As [`Event::trigger`]; it has no dash.
+    pub trigger: String,
+}
+
+impl fmt::Display for DumpName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}-{:010}-{}", self.process, self.cycle, self.trigger)
+    }
+}
+
+impl DumpName {
+    /// Reads the name of a folder, with any number of digits; `None` for one that is no dump.
+    #[must_use]
+    pub fn parse(folder: &str) -> Option<Self> {
+        let mut parts = folder.rsplitn(3, '-');
+        let (trigger, cycle, process) = (parts.next()?, parts.next()?, parts.next()?);
+        Some(Self { process: process.into(), cycle: cycle.parse().ok()?, trigger: trigger.into() })
+    }
+}
+
+/// The dumps of a run in alphabetical order, each with its folder as it is called; none without [`FOLDER`].
+///
+/// # Errors
+/// What the system says, with the folder's name.
+pub fn list(run: &Path) -> io::Result<Vec<(String, DumpName)>> {
+    let folder = run.join(FOLDER);
+    let entries = match fs::read_dir(&folder) {
+        Ok(entries) => entries,
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        Err(error) => return Err(named(&folder, &error)),
+    };
+    let mut dumps = Vec::new();
+    for entry in entries {
+        let name = entry.map_err(|error| named(&folder, &error))?.file_name().into_string();
+        dumps.extend(name.ok().and_then(|name| DumpName::parse(&name).map(|parsed| (name, parsed))));
+    }
+    dumps.sort_by(|(one, _), (other, _)| one.cmp(other));
+    Ok(dumps)
 }
 
 /// How frames are written down.
@@ -76,9 +122,9 @@ pub fn write<'a>(
     frames: impl IntoIterator<Item = &'a FrameRecord>,
     log: &FrameLogFormat,
 ) -> io::Result<()> {
-    let folder = run.join(FOLDER).join(event.name());
+    let folder = run.join(FOLDER).join(event.name().to_string());
     fs::create_dir_all(&folder).map_err(|error| named(&folder, &error))?;
-    write_file(&folder.join("timing.csv"), |out| {
+    write_file(&folder.join(TIMING_CSV), |out| {
         write_head(out)?;
         rows.into_iter().try_for_each(|row| write_row(out, row))
     })?;
@@ -87,7 +133,7 @@ pub fn write<'a>(
             .into_iter()
             .try_for_each(|record| candump::write_line(out, &log.interface, log.epoch_offset_ns, record))
     })?;
-    write_json(&folder.join("event.json"), event)
+    write_json(&folder.join(EVENT_JSON), event)
 }
 
 /// Removes a dump, that one more severe may take its place.
@@ -107,22 +153,8 @@ pub fn remove(run: &Path, name: &str) -> io::Result<()> {
 /// # Errors
 /// What the system says, with the folder's name.
 pub fn clear(run: &Path, process: &str) -> io::Result<()> {
-    let folder = run.join(FOLDER);
-    let entries = match fs::read_dir(&folder) {
-        Ok(entries) => entries,
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-        Err(error) => return Err(named(&folder, &error)),
-    };
-    for entry in entries {
-        let name = entry.map_err(|error| named(&folder, &error))?.file_name();
-        let Some(name) = name.to_str() else { continue };
-        // One process's name may begin another's; the cycle that follows tells.
-        let of_process = name.strip_prefix(process).and_then(|rest| rest.strip_prefix('-'));
-        if of_process.is_some_and(|rest| rest.starts_with(|first: char| first.is_ascii_digit())) {
-            remove(run, name)?;
-        }
-    }
-    Ok(())
+    let dumps = list(run)?;
+    dumps.iter().filter(|(_, name)| name.process == process).try_for_each(|(folder, _)| remove(run, folder))
 }
 
 fn write_file(
@@ -163,6 +195,17 @@ mod tests {
     }
 
     #[test]
+    fn a_name_that_was_written_reads_back_and_others_are_no_dumps() {
+        let name = event("controller-drive", 42).name();
+        assert_eq!(name.to_string(), "controller-drive-0000000042-late");
+        assert_eq!(DumpName::parse(&name.to_string()), Some(name));
+        assert_eq!(DumpName::parse("emulator-7-late"), Some(event("emulator", 7).name()), "fewer digits");
+        for other in ["notes", "emulator-7", "controller-drive-late", "emulator-x-late"] {
+            assert_eq!(DumpName::parse(other), None, "{other}");
+        }
+    }
+
+    #[test]
     fn a_process_clears_its_own_dumps_alone() {
         let run = tempfile::tempdir().unwrap();
         clear(run.path(), "controller").unwrap();
@@ -171,11 +214,7 @@ mod tests {
             write(run.path(), &event(process, 7), &[], [], &log).unwrap();
         }
         clear(run.path(), "controller").unwrap();
-        let mut left: Vec<_> = fs::read_dir(run.path().join(FOLDER))
-            .unwrap()
-            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
-            .collect();
-        left.sort();
+        let left: Vec<_> = list(run.path()).unwrap().into_iter().map(|(folder, _)| folder).collect();
         assert_eq!(left, ["controller-drive-0000000007-late", "emulator-0000000007-late"]);
         remove(run.path(), "emulator-0000000007-late").unwrap();
         remove(run.path(), "emulator-0000000007-late").unwrap();

@@ -10,7 +10,7 @@
 //! In real time only: simulated time is never late.
 
 use crate::candump::FrameRecord;
-use crate::flight_dump::{self, Event, FrameLogFormat};
+use crate::flight_dump::{self, DumpName, Event, FrameLogFormat};
 use crate::process::Process;
 use crate::run_folder::{LineFile, SCHEMA_VERSION};
 use crate::timing::{self, CycleTiming};
@@ -355,8 +355,9 @@ fn write_dump(
     log: &FrameLogFormat,
 ) -> io::Result<()> {
     if let Some(replaced) = dump.replaces {
-        let name = flight_dump::name(process.name(), replaced.cycle, &replaced.severity.to_string());
-        flight_dump::remove(folder, &name)?;
+        let (process, trigger) = (process.name().into(), replaced.severity.to_string());
+        let name = DumpName { process, cycle: replaced.cycle, trigger };
+        flight_dump::remove(folder, &name.to_string())?;
     }
     let Trigger { severity, cycle, at, late_ns, slow_ns } = dump.trigger;
     let event = Event {

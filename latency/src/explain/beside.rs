@@ -28,16 +28,11 @@ pub(crate) fn add(event: &mut Event, run: &RunFiles) {
 
 /// The folder of the dump of these cycles, within the run's.
 fn dump(folder: &Path, process: &str, first: u64, last: u64) -> Option<String> {
-    let entries = std::fs::read_dir(folder.join(flight_dump::FOLDER)).ok()?;
-    let near = entries.filter_map(|entry| {
-        let name = entry.ok()?.file_name().into_string().ok()?;
-        // PROCESS-CYCLE-TRIGGER, and a process may have a dash in its name.
-        let mut parts = name.rsplitn(3, '-').skip(1);
-        let (cycle, of): (u64, _) = (parts.next()?.parse().ok()?, parts.next()?);
-        let is_near = (first.saturating_sub(DUMP_WITHIN_CYCLES)..=last + DUMP_WITHIN_CYCLES).contains(&cycle);
-        (of == process && is_near).then(|| (cycle.abs_diff(last), format!("{}/{name}", flight_dump::FOLDER)))
-    });
-    near.min().map(|(_, name)| name)
+    let within = first.saturating_sub(DUMP_WITHIN_CYCLES)..=last + DUMP_WITHIN_CYCLES;
+    let dumps = flight_dump::list(folder).unwrap_or_default().into_iter();
+    let near = dumps.filter(|(_, name)| name.process == process && within.contains(&name.cycle));
+    let nearest = near.min_by_key(|(_, name)| name.cycle.abs_diff(last));
+    nearest.map(|(dump, _)| format!("{}/{dump}", flight_dump::FOLDER))
 }
 
 /// Frames of a log of candump by identifier; nothing without one.
