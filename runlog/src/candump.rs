@@ -49,6 +49,8 @@ pub struct LineError {
 pub struct Line<'a> {
     /// Name of the interface.
     pub interface: &'a str,
+    /// Identifier of the frame, hexadecimal.
+    pub identifier: &'a str,
     /// The frame and its time; ns since the log's epoch.
     pub record: FrameRecord,
 }
@@ -88,7 +90,7 @@ pub fn parse_line(line: &str) -> Result<Line<'_>, LineError> {
         word.split_once('#').ok_or_else(|| at(word, "a frame is IDENTIFIER#DATA, as 120#0011"))?;
     let raw_id = read_identifier(id).map_err(|problem| at(id, problem))?;
     let frame = read_frame(raw_id, data).map_err(|problem| at(data, problem))?;
-    Ok(Line { interface, record: FrameRecord { stamp_ns, frame } })
+    Ok(Line { interface, identifier: id, record: FrameRecord { stamp_ns, frame } })
 }
 
 fn read_stamp(stamp: &str) -> Option<u64> {
@@ -208,7 +210,8 @@ mod tests {
             let error = parse_line(line).unwrap_err();
             assert!(error.column == column && error.problem.contains(words), "{line}: {error}");
         }
-        assert_eq!(parse_line("(1.0) vcan0 120#00").unwrap().interface, "vcan0");
+        let line = parse_line("(1.0) vcan0 120#00").unwrap();
+        assert_eq!((line.interface, line.identifier), ("vcan0", "120"));
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 use crate::files::RunFiles;
 use crate::model::Event;
+use runlog::candump;
 use runlog::event::EventKind;
 use runlog::flight_dump;
 use runlog::run_folder::BUS_LOG;
@@ -39,11 +40,8 @@ fn dump(folder: &Path, process: &str, first: u64, last: u64) -> Option<String> {
 fn frames(log: &Path) -> BTreeMap<String, u64> {
     let text = std::fs::read_to_string(log).unwrap_or_default();
     let mut counts = BTreeMap::new();
-    // (seconds) bus IDENTIFIER#DATA
-    for frame in text.lines().filter_map(|line| line.split_whitespace().nth(2)) {
-        if let Some((identifier, _)) = frame.split_once('#') {
-            *counts.entry(identifier.to_owned()).or_default() += 1;
-        }
+    for line in text.lines().filter_map(|line| candump::parse_line(line).ok()) {
+        *counts.entry(line.identifier.to_owned()).or_default() += 1;
     }
     counts
 }
