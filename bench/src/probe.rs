@@ -26,13 +26,13 @@ mod gaps;
 use crate::say;
 use cli::ProbeArguments;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use gaps::{Gap, GapTotal, GapWatch};
-use latency::probe::COLUMNS;
+use gaps::{GapTotal, GapWatch};
 use protocol::exit::Exit;
 use realtime::privileges::parse_cpu_list;
 use realtime::signals::Continued;
 use realtime::vitals::VitalsReader;
 use realtime::{Clock, Interrupt, MonotonicClock, Request};
+use runlog::probe::{Gap, write_head, write_row};
 use runlog::run_folder::LineFile;
 use std::collections::BTreeMap;
 use std::io;
@@ -80,8 +80,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;
     let continued = Continued::watch().map_err(ProbeError::Signals)?;
     let mut file = LineFile::create(&arguments.out).map_err(ProbeError::Write)?;
-    file.lines().extend_from_slice(format!("{}\n", COLUMNS.join(",")).as_bytes());
-    file.write_out().map_err(ProbeError::Write)?;
+    write_head(file.lines()).and_then(|()| file.write_out()).map_err(ProbeError::Write)?;
     // A page fault would be a gap caused by the probe.
     realtime::acquire(&Request { lock_memory: true, ..Request::default() });
 
@@ -89,7 +88,7 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let (sender, gaps) = bounded(QUEUE);
     let began_ns = MonotonicClock.now().as_nanos();
     let mut table =
-        Table { file, rows: 0, by_cpu: cpus.iter().map(|&cpu| (cpu, CpuGaps::default())).collect() };
+        Table { file, rows: 0, by_cpu: cpus.iter().map(|&cpu| (cpu as u64, CpuGaps::default())).collect() };
     std::thread::scope(|scope| {
         let (ready, all_ready) = bounded(cpus.len());
         for &cpu in &cpus {
@@ -100,11 +99,11 @@ pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
                 let begun = begin(cpu);
                 let good = begun.is_ok();
                 // The first reading comes before the report, so that no gap after the report is missed.
-                let looking = SpinningThread::begin(gap_ns, continued);
+                let looking = SpinningThread::begin(cpu, gap_ns, continued);
                 // The main thread takes one result of each.
                 let _ = ready.send(begun);
                 if good {
-                    looking.spin(cpu, &sender, state);
+                    looking.spin(&sender, state);
                 }
             });
         }
@@ -172,18 +171,18 @@ struct SpinningThread {
 }
 
 impl SpinningThread {
-    fn begin(gap_ns: u64, continued: Continued) -> Self {
+    fn begin(cpu: usize, gap_ns: u64, continued: Continued) -> Self {
         let vitals = VitalsReader::new(continued);
-        Self { vitals, watch: GapWatch::new(gap_ns, MonotonicClock.now().as_nanos()) }
+        Self { vitals, watch: GapWatch::new(cpu as u64, gap_ns, MonotonicClock.now().as_nanos()) }
     }
 
-    fn spin(mut self, cpu: usize, gaps: &Sender<(usize, Gap)>, state: &ProbeState) {
+    fn spin(mut self, gaps: &Sender<Gap>, state: &ProbeState) {
         let mut going_on = true;
         while going_on {
             // Checked before the clock is read, so that a gap that outlasts the run is recorded too.
             going_on = !state.stop.came();
             if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), || self.vitals.read())
-                && gaps.try_send((cpu, gap)).is_err()
+                && gaps.try_send(gap).is_err()
             {
                 state.dropped.fetch_add(1, Ordering::Relaxed);
             }
@@ -195,36 +194,35 @@ impl SpinningThread {
 struct Table {
     file: LineFile,
     rows: u64,
-    by_cpu: BTreeMap<usize, CpuGaps>,
+    by_cpu: BTreeMap<u64, CpuGaps>,
 }
 
 impl Table {
     /// A row of zero length for each CPU: observed from here on, with or without gaps.
     fn name_cpus(&mut self, cpus: &[usize], now_ns: u64) -> Result<(), ProbeError> {
         for cpu in cpus {
-            self.file.lines().extend_from_slice(format!("{cpu},{now_ns},{now_ns},0\n").as_bytes());
+            let row = Gap::beginning(*cpu as u64, now_ns);
+            write_row(self.file.lines(), &row).map_err(ProbeError::Write)?;
         }
         self.file.write_out().map_err(ProbeError::Write)
     }
 
     /// Writes the waiting gaps.
-    fn take(&mut self, gaps: &Receiver<(usize, Gap)>) -> Result<(), ProbeError> {
-        for (cpu, gap) in gaps.try_iter() {
+    fn take(&mut self, gaps: &Receiver<Gap>) -> Result<(), ProbeError> {
+        for gap in gaps.try_iter() {
             self.rows += 1;
-            let of_cpu = self.by_cpu.entry(cpu).or_default();
+            let of_cpu = self.by_cpu.entry(gap.cpu).or_default();
             if gap.another_ran { &mut of_cpu.another_ran } else { &mut of_cpu.stood_still }.add(&gap);
             if self.rows <= MOST_ROWS {
-                let Gap { from_ns, to_ns, another_ran } = gap;
-                let line = format!("{cpu},{from_ns},{to_ns},{}\n", u8::from(another_ran));
-                self.file.lines().extend_from_slice(line.as_bytes());
-                self.file.write_when_full().map_err(ProbeError::Write)?;
+                let written = write_row(self.file.lines(), &gap);
+                written.and_then(|()| self.file.write_when_full()).map_err(ProbeError::Write)?;
             }
         }
         self.file.write_out().map_err(ProbeError::Write)
     }
 }
 
-fn print_sums(by_cpu: &BTreeMap<usize, CpuGaps>, length_ns: u64) {
+fn print_sums(by_cpu: &BTreeMap<u64, CpuGaps>, length_ns: u64) {
     let part = |total: &GapTotal| {
         let share_percent = 100.0 * total.together_ns as f64 / length_ns.max(1) as f64;
         format!("{:>7}  {:>10.1}  {share_percent:>7.3}", total.count, total.longest_ns as f64 / 1e3)

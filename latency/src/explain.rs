@@ -17,9 +17,10 @@ pub(crate) mod rules;
 use super::files::{EMULATOR, RunFiles};
 use super::findings::lost_by_gaps;
 use super::model::{Event, NearbyCycle, ProbeGap};
-use super::probe::{self, Gap};
+use super::probe;
 use protocol::periods::CYCLE_NS;
 use rules::LatenessEvidence;
+use runlog::probe::Gap;
 use runlog::timing::CycleTiming;
 use std::collections::BTreeMap;
 

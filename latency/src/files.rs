@@ -4,7 +4,6 @@ use super::hlog::{self, BorrowedInterval};
 use super::joined::Series;
 use super::json_files::{ControllerFile, RunFile, SummaryFile};
 use super::kinds::{PING_PONG, PING_PONGS, ROUND_TRIPS};
-use super::probe::{self, Gap};
 use super::reference::{self, Reference};
 use super::samples::Samples;
 use protocol::periods::CYCLE_S;
@@ -14,6 +13,7 @@ use runlog::conditions::Conditions;
 use runlog::controller_report::ControllerReport;
 use runlog::flight_dump::{self, DumpName, EVENT_JSON, TIMING_CSV};
 use runlog::ping_pong::PingPongFile;
+use runlog::probe::{self, Gap};
 use runlog::process::{HLOG_END, Process};
 use runlog::run_folder::{
     CONDITIONS_JSON, CYCLICTEST_JSON, PING_PONG_JSON, PROBE_CSV, RUN_JSON, SUMMARY_JSON, read_json,

@@ -8,7 +8,7 @@
 //! | [`json_files`] | its JSON files as their types |
 //! | [`frame_faults`] | lost, late, duplicate and malformed frames in them |
 //! | [`hlog`] | interval logs, read and written |
-//! | [`probe`] | gaps that the spin-gap probe saw |
+//! | [`probe`] | whether the spin-gap probe watched a CPU |
 //! | [`mod@reference`] | cyclictest's own JSON |
 //! | [`kinds`] | the distributions that a report knows |
 //! | [`samples`] | percentiles, bins |
@@ -55,7 +55,7 @@ pub mod model;
 pub mod output;
 pub mod page;
 mod parts;
-pub mod probe;
+mod probe;
 mod ratios;
 mod reference;
 pub mod report_cause;

@@ -6,7 +6,7 @@
 //! | [`run_folder`], [`process`] | names of files and processes, writing without half a file |
 //! | [`summary`], [`controller_report`], [`conditions`], [`ping_pong`] | the JSON files of a run |
 //! | [`timing`], [`timing_recorder`], [`flight_dump`] | stamps of each cycle, what is recorded of them, the last second |
-//! | [`candump`], [`event`] | `bus.log`; events of a run |
+//! | [`candump`], [`event`], [`probe`] | `bus.log`; events of a run; gaps of a spinning thread |
 //! | [`telemetry`] | the stream to viewers |
 //! | [`discrepancy_report`] | `report.json` of `discrepancy close` |
 //! | [`golden`] | golden files for tests |
@@ -22,6 +22,7 @@ pub mod event;
 pub mod flight_dump;
 pub mod golden;
 pub mod ping_pong;
+pub mod probe;
 pub mod process;
 pub mod run_folder;
 pub mod summary;

@@ -10,6 +10,7 @@
 //! kernel.
 
 use realtime::VitalCounts;
+use runlog::probe::Gap;
 
 /// Period of reading the counters without a gap, so that they cover a gap and little before it.
 const REFRESH_NS: u64 = 1_000_000;
@@ -22,20 +23,10 @@ fn was_preempted(counted: &VitalCounts, length_ns: u64) -> bool {
         || (counted.involuntary_switches > 0 && (untold || counted.run_delay_ns >= length_ns / 2))
 }
 
-/// A gap on one CPU, on CLOCK_MONOTONIC.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Gap {
-    /// Last reading before it, ns.
-    pub from_ns: u64,
-    /// First reading after it, ns.
-    pub to_ns: u64,
-    /// Whether another thread had the CPU, or the probe was stopped.
-    pub another_ran: bool,
-}
-
-/// Finds gaps in the readings of the clock.
+/// Finds gaps in the readings of the clock on one CPU.
 #[derive(Debug)]
 pub(super) struct GapWatch {
+    cpu: u64,
     gap_ns: u64,
     last_ns: u64,
     refreshed_ns: u64,
@@ -43,8 +34,8 @@ pub(super) struct GapWatch {
 
 impl GapWatch {
     /// A watch whose first reading is `now_ns`.
-    pub(super) fn new(gap_ns: u64, now_ns: u64) -> Self {
-        Self { gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
+    pub(super) fn new(cpu: u64, gap_ns: u64, now_ns: u64) -> Self {
+        Self { cpu, gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
     }
 
     /// The next reading; `counts` returns the counters since its last call.
@@ -57,7 +48,7 @@ impl GapWatch {
         }
         self.refreshed_ns = now_ns;
         let another_ran = was_preempted(&counts(), length_ns);
-        is_gap.then_some(Gap { from_ns, to_ns: now_ns, another_ran })
+        is_gap.then_some(Gap { cpu: self.cpu, from_ns, to_ns: now_ns, another_ran })
     }
 }
 
@@ -90,10 +81,13 @@ mod tests {
 
     #[test]
     fn only_a_pause_longer_than_asked_is_a_gap_and_it_goes_from_look_to_look() {
-        let mut watch = GapWatch::new(GAP_NS, 1_000);
+        let mut watch = GapWatch::new(3, GAP_NS, 1_000);
         assert_eq!(watch.look(1_000 + GAP_NS, VitalCounts::default), None);
         let gap = watch.look(1_001 + 2 * GAP_NS, VitalCounts::default).expect("a nanosecond too long");
-        assert_eq!(gap, Gap { from_ns: 1_000 + GAP_NS, to_ns: 1_001 + 2 * GAP_NS, another_ran: false });
+        assert_eq!(
+            gap,
+            Gap { cpu: 3, from_ns: 1_000 + GAP_NS, to_ns: 1_001 + 2 * GAP_NS, another_ran: false }
+        );
         assert_eq!(watch.look(gap.to_ns + 50, VitalCounts::default), None, "a gap is told once");
     }
 
@@ -110,7 +104,7 @@ mod tests {
             // Stopped by a signal: the machine has nothing to do with it.
             (counts(1, 0, 2_000), true),
         ] {
-            let mut watch = GapWatch::new(GAP_NS, 0);
+            let mut watch = GapWatch::new(3, GAP_NS, 0);
             let gap = watch.look(1_000_000, || counted).expect("1 ms is a gap");
             assert_eq!(gap.another_ran, another_ran, "{counted:?}");
         }
@@ -118,7 +112,7 @@ mod tests {
 
     #[test]
     fn counts_from_before_the_last_millisecond_are_forgotten() {
-        let mut watch = GapWatch::new(GAP_NS, 0);
+        let mut watch = GapWatch::new(3, GAP_NS, 0);
         let mut pending = counts(0, 1, 60_000);
         let mut asked = 0;
         for now_ns in (50_000..=1_000_000).step_by(50_000) {
@@ -137,7 +131,7 @@ mod tests {
     fn totals_add_up() {
         let mut total = GapTotal::default();
         for (from_ns, to_ns) in [(0, 200_000), (500_000, 1_000_000)] {
-            total.add(&Gap { from_ns, to_ns, another_ran: false });
+            total.add(&Gap { cpu: 3, from_ns, to_ns, another_ran: false });
         }
         assert_eq!(total, GapTotal { count: 2, longest_ns: 500_000, together_ns: 700_000 });
     }
