@@ -197,10 +197,12 @@ fn frames(report: &Report) -> String {
     let mut rows = Vec::new();
     for (place, run) in report.runs.iter().enumerate() {
         for row in &run.arrivals {
-            let reported = &row.interval_ns;
-            let name = format!("{place} {} at {}", row.frame, row.receiver);
-            let counts = [row.period_ms, row.count, row.gaps].map(|count| count.to_string());
-            let bursts = row.bursts.map_or_else(|| "sent on change too".into(), |count| count.to_string());
+            let figures = &row.figures;
+            let reported = &figures.interval_ns;
+            let name = format!("{place} {} at {}", figures.frame, row.receiver);
+            let counts = [figures.period_ms, figures.count, figures.gaps].map(|count| count.to_string());
+            let bursts =
+                figures.bursts.map_or_else(|| "sent on change too".into(), |count| count.to_string());
             let ends =
                 [reported.p50, reported.p99, reported.max].map(|ns| ns.map_or_else(|| "-".into(), in_words));
             rows.push(std::iter::once(name).chain(counts).chain([bursts]).chain(ends).collect());

@@ -4,6 +4,7 @@
 //! Nothing is NaN: what was not measured is null or missing from its list.
 
 use super::resolution::Verdict;
+use realtime::ArrivalFigures;
 /// In ns; null when nothing was measured, or too little for that percentile to differ from the maximum.
 pub use realtime::Percentiles as PercentilesNs;
 use runlog::timing_recorder::CommandAges;
@@ -348,19 +349,9 @@ pub struct FrameFaultCounts {
 pub struct ArrivalRow {
     /// Who received it: `emulator`, `controller`.
     pub receiver: String,
-    /// The frame, such as `DriveSensors`.
-    pub frame: String,
-    /// Its period, ms.
-    pub period_ms: u64,
-    /// Frames that came.
-    pub count: u64,
-    /// Intervals longer than one and a half periods.
-    pub gaps: u64,
-    /// Intervals shorter than half a period; none of a frame that is sent on change too.
-    #[serde(default)]
-    pub bursts: Option<u64>,
-    /// Intervals between one frame and the next, ns.
-    pub interval_ns: PercentilesNs,
+    /// What it counted of the frame.
+    #[serde(flatten)]
+    pub figures: ArrivalFigures,
 }
 
 /// Groups of runs side by side.

@@ -77,12 +77,10 @@ fn arrivals(run: &RunFiles) -> Vec<ArrivalRow> {
     let of_process = |(receiver, report): (&str, &ProcessReport)| {
         let row = |reported: &ArrivalFigures| ArrivalRow {
             receiver: receiver.to_owned(),
-            frame: reported.frame.to_string(),
-            period_ms: reported.period_ms,
-            count: reported.count,
-            gaps: reported.gaps,
-            bursts: reported.bursts,
-            interval_ns: percentiles(&reported.interval_ns).unwrap_or_default(),
+            figures: ArrivalFigures {
+                interval_ns: percentiles(&reported.interval_ns).unwrap_or_default(),
+                ..reported.clone()
+            },
         };
         report.timing.arrivals.iter().map(row).collect::<Vec<_>>()
     };
@@ -125,10 +123,12 @@ mod tests {
         });
         made_up::edit_controller(&mut run, |controller| controller["arrivals"] = row("DriveSensors"));
         let reported = arrivals(&run);
-        let names: Vec<_> =
-            reported.iter().map(|row| (row.receiver.as_str(), row.frame.as_str(), row.gaps)).collect();
+        let names: Vec<_> = reported
+            .iter()
+            .map(|ArrivalRow { receiver, figures }| (receiver.as_str(), &*figures.frame, figures.gaps))
+            .collect();
         assert_eq!(names, [("emulator", "DriveValveCommand", 2), ("controller", "DriveSensors", 2)]);
-        assert_eq!(reported[0].interval_ns.p50, Some(1_000_000));
-        assert_eq!((reported[0].bursts, reported[1].bursts), (None, Some(1)));
+        assert_eq!(reported[0].figures.interval_ns.p50, Some(1_000_000));
+        assert_eq!((reported[0].figures.bursts, reported[1].figures.bursts), (None, Some(1)));
     }
 }

@@ -7,10 +7,11 @@ use crate::tallies;
 use pagekit::grid::Grid;
 use pagekit::markup::{Cell, Table, folded, list, number, words as text};
 use pagekit::number;
+use realtime::ArrivalFigures;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Adds a row to the sum over all runs; of the percentiles the largest, since those of runs cannot be added up.
-fn add(sum: &mut ArrivalRow, row: &ArrivalRow) {
+fn add(sum: &mut ArrivalFigures, row: &ArrivalFigures) {
     sum.period_ms = row.period_ms;
     sum.count += row.count;
     sum.gaps += row.gaps;
@@ -29,8 +30,10 @@ pub(super) fn arrivals(runs: &[RunPart]) -> String {
     let mut each = Table::new("Arrivals of each run", ["run"].into_iter().chain(head).chain(intervals));
     for (run, part) in runs.iter().enumerate() {
         for row in &part.arrivals {
-            let key = (row.receiver.as_str(), row.frame.as_str());
-            sums.entry(key).and_modify(|sum| add(sum, row)).or_insert_with(|| row.clone());
+            let key = (row.receiver.as_str(), &*row.figures.frame);
+            sums.entry(key)
+                .and_modify(|sum| add(&mut sum.figures, &row.figures))
+                .or_insert_with(|| row.clone());
             each.row([text(format!("{run}"))].into_iter().chain(arrival_cells(row)));
         }
     }
@@ -45,12 +48,13 @@ pub(super) fn arrivals(runs: &[RunPart]) -> String {
 }
 
 /// Receiver and frame, and what came of it.
-fn arrival_cells(of: &ArrivalRow) -> Vec<Cell> {
+fn arrival_cells(row: &ArrivalRow) -> Vec<Cell> {
+    let of = &row.figures;
     let counts = [of.period_ms, of.count, of.gaps].map(|value| number(number::count(value)));
     let bursts = of.bursts.map_or_else(|| text("sent on change too"), |bursts| number(number::count(bursts)));
     let PercentilesNs { p99, p999, max, .. } = of.interval_ns;
     let lengths = [p99, p999, max].map(|ns| number(number::us_or_not_measured(ns)));
-    [text(&of.receiver), text(&of.frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
+    [text(&row.receiver), text(&*of.frame)].into_iter().chain(counts).chain([bursts]).chain(lengths).collect()
 }
 
 pub(super) fn counts(runs: &[RunPart]) -> String {

@@ -2,6 +2,7 @@
 
 use latency::model::*;
 use latency::samples::Samples;
+use realtime::ArrivalFigures;
 use runlog::timing_recorder::CommandAges;
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
@@ -234,12 +235,14 @@ fn run(place: usize) -> RunPart {
         [("emulator", "DriveValveCommand"), ("emulator", "LoadValveCommand"), ("controller", "DriveSensors")];
     let arrival = |(receiver, frame): (&str, &str)| ArrivalRow {
         receiver: receiver.into(),
-        frame: frame.into(),
-        period_ms: 1,
-        count: 59_990,
-        gaps: skipped,
-        bursts: Some(2),
-        interval_ns,
+        figures: ArrivalFigures {
+            frame: frame.to_owned().into(),
+            period_ms: 1,
+            count: 59_990,
+            gaps: skipped,
+            bursts: Some(2),
+            interval_ns,
+        },
     };
     RunPart {
         folder: format!("/tmp/airbench/latency/20261120-1030{place:02}-idle"),
