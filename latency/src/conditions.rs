@@ -2,6 +2,7 @@
 
 use super::add_new;
 use super::files::{EMULATOR, RunFiles};
+use super::json_files::RunFacts;
 use super::model::{Conditions, Fact};
 use realtime::Grant;
 use serde_json::Value;
@@ -74,11 +75,15 @@ fn machine(runs: &[RunFiles]) -> Vec<Fact> {
             facts.add("uncommitted files", &files.to_string());
         }
         if let Some(file) = &run.run {
-            for key in ["emulator_version", "counts_allocations", "bus", "pace"] {
-                // An older file without the key has no such fact.
-                if let Some(value) = file.json.get(key).filter(|value| !value.is_null()) {
-                    facts.add(&key.replace('_', " "), &text(value));
-                }
+            let RunFacts { emulator_version, counts_allocations, bus, pace } = &file.facts;
+            let counts_allocations = counts_allocations.map(|counts| counts.to_string());
+            for (name, value) in [
+                ("emulator version", emulator_version),
+                ("counts allocations", &counts_allocations),
+                ("bus", bus),
+                ("pace", pace),
+            ] {
+                value.iter().for_each(|value| facts.add(name, value));
             }
         }
         for (process, reported) in

@@ -1,7 +1,7 @@
 //! The JSON files of a run: each is deserialised once, and kept as it stands for the tables of all counts and all machine facts.
 //!
 //! A file of another version or of a foreign program may not be as its type has it. Then the type is empty, and `misfit` says
-//! why. The parts beside it are deserialised by themselves: damage elsewhere in the file does not hide them.
+//! why. The parts beside it are views of the same keys, field by field: damage elsewhere in the file does not hide them.
 
 use super::frame_faults::{FramesAtController, FramesAtRig};
 use super::model::FrameFaultCounts;
@@ -11,6 +11,7 @@ use runlog::controller_report::ControllerReport;
 use runlog::summary::{ProcessReport, RunDescription, Summary};
 use runlog::timing_recorder::CommandAges;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 /// `summary.json`.
@@ -35,6 +36,7 @@ pub(crate) struct RunFile {
     /// Why `description` is empty, if the file is not as its type has it.
     pub misfit: Option<String>,
     pub hypervisor: Hypervisor,
+    pub facts: RunFacts,
     /// What the emulator was granted for real time.
     pub granted: Vec<Grant>,
     /// The file as it stands.
@@ -57,6 +59,51 @@ pub(crate) struct ControllerFile {
     pub json: Value,
 }
 
+/// Facts of `run.json` that a report shows as they stand. [`RunDescription`] makes a default of one that an older file lacks.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub(crate) struct RunFacts {
+    #[serde(deserialize_with = "lenient")]
+    pub emulator_version: Option<String>,
+    #[serde(deserialize_with = "lenient")]
+    pub counts_allocations: Option<bool>,
+    #[serde(deserialize_with = "lenient")]
+    pub bus: Option<String>,
+    #[serde(deserialize_with = "lenient")]
+    pub pace: Option<String>,
+}
+
+/// View of `run.json`.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct MachineOfRun {
+    #[serde(deserialize_with = "lenient")]
+    machine: MachineView,
+}
+
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct MachineView {
+    #[serde(deserialize_with = "lenient")]
+    hypervisor: Hypervisor,
+}
+
+/// View of `run.json` and `controller*.json`.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct Granted {
+    #[serde(deserialize_with = "grants")]
+    realtime_granted: Vec<Grant>,
+}
+
+/// View of `summary.json`.
+#[derive(Default, Deserialize)]
+#[serde(default)]
+struct AgesInSummary {
+    #[serde(deserialize_with = "lenient")]
+    command_age_cycles: CommandAges,
+}
+
 impl SummaryFile {
     pub(crate) fn of(json: Value) -> Option<Self> {
         let (summary, misfit) = typed(&json)?;
@@ -65,7 +112,7 @@ impl SummaryFile {
             misfit,
             process: part(&json),
             frame_faults: part::<FramesAtRig>(&json).into(),
-            command_ages: part(&json["command_age_cycles"]),
+            command_ages: part::<AgesInSummary>(&json).command_age_cycles,
             json,
         })
     }
@@ -77,8 +124,9 @@ impl RunFile {
         Some(Self {
             description,
             misfit,
-            hypervisor: part(&json["machine"]["hypervisor"]),
-            granted: grants(&json),
+            hypervisor: part::<MachineOfRun>(&json).machine.hypervisor,
+            facts: part(&json),
+            granted: part::<Granted>(&json).realtime_granted,
             json,
         })
     }
@@ -91,7 +139,7 @@ impl ControllerFile {
             report,
             misfit,
             process: part(&json),
-            granted: grants(&json),
+            granted: part::<Granted>(&json).realtime_granted,
             frame_faults: part::<FramesAtController>(&json).into(),
             json,
         })
@@ -111,10 +159,15 @@ fn part<T: DeserializeOwned + Default>(json: &Value) -> T {
     T::deserialize(json).unwrap_or_default()
 }
 
-/// The grants of a report, one by one: a line that is no text hides no other.
-fn grants(report: &Value) -> Vec<Grant> {
-    let lines = report["realtime_granted"].as_array().into_iter().flatten().filter_map(Value::as_str);
-    lines.map(Grant::from).collect()
+/// A field of a view; empty where it is not as its type has it.
+fn lenient<'de, D: Deserializer<'de>, T: DeserializeOwned + Default>(field: D) -> Result<T, D::Error> {
+    Value::deserialize(field).map(|value| part(&value))
+}
+
+/// Grants, one by one: a line that is no text hides no other.
+fn grants<'de, D: Deserializer<'de>>(field: D) -> Result<Vec<Grant>, D::Error> {
+    let lines: Vec<Value> = lenient(field)?;
+    Ok(lines.iter().filter_map(Value::as_str).map(Grant::from).collect())
 }
 
 #[cfg(test)]
@@ -134,10 +187,12 @@ mod tests {
 
         let run = RunFile::of(json!({
             "seed": -1, "realtime_granted": ["pinned to CPU 3", 5], "machine": { "hypervisor": "KVM" },
+            "bus": 1, "pace": "real",
         }))
         .unwrap();
         assert!(run.misfit.is_some() && run.hypervisor.is_present());
         assert_eq!(run.granted, [Grant::Cpu(3)]);
+        assert_eq!((run.facts.bus, run.facts.pace.as_deref()), (None, Some("real")));
 
         let controller = ControllerFile::of(json!({
             "version": 1, "frames_duplicate": 4, "realtime_granted": ["pinned to CPU 1"], "records_dropped": 5,
@@ -149,6 +204,26 @@ mod tests {
             (Some(5), Some(4))
         );
         assert_eq!(controller.granted, [Grant::Cpu(1)]);
+    }
+
+    #[test]
+    fn the_views_read_what_the_types_write() {
+        let description = RunDescription::<Value> {
+            emulator_version: "1.2".into(),
+            counts_allocations: true,
+            bus: "unix:///x".into(),
+            pace: "real".into(),
+            realtime_granted: [Grant::Cpu(3)].into(),
+            ..RunDescription::default()
+        };
+        let run = RunFile::of(json!(description)).unwrap();
+        let facts = run.facts;
+        assert_eq!((facts.emulator_version, facts.counts_allocations), (Some("1.2".into()), Some(true)));
+        assert_eq!((facts.bus, facts.pace), (Some("unix:///x".into()), Some("real".into())));
+        assert_eq!(
+            (run.granted, run.hypervisor),
+            (description.realtime_granted, description.machine.hypervisor)
+        );
     }
 
     #[test]
