@@ -12,7 +12,7 @@ use crate::parts::write_whole;
 use crate::shard::{Shard, ShardError};
 use clap::Parser as _;
 use protocol::exit::Exit;
-use runlog::run_folder::SCHEMA_VERSION;
+use runlog::run_folder::{REPORT_HTML, SCHEMA_VERSION};
 use serde_json::json;
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -174,7 +174,7 @@ fn results(
     let file = std::fs::canonicalize(&campaign.file.path).unwrap_or_else(|_| campaign.file.path.clone());
     let file = quoted(&file.display().to_string());
     let command = |run: u64| format!("scripts/campaign repeat {file} {run}");
-    let path = to.join("report.html");
+    let path = to.join(REPORT_HTML);
     write_whole(&path, page(campaign, &results, &command).as_bytes())
         .map_err(|error| CommandError::File(path.display().to_string(), error))?;
     say(&format!(

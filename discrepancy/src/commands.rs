@@ -24,6 +24,7 @@ use crate::{locate, page, verify};
 use model_fit::{is_model_file, successor};
 use plant::effects::{SHEETS, sheet};
 use protocol::exit::Exit;
+use runlog::run_folder::{REPORT_HTML, REPORT_JSON};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::io::{self, Write as _};
@@ -119,7 +120,7 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
     let inputs = [&records.rig].into_iter().chain(&records.train).chain(tests);
     let out = Folder::open(&out, inputs.chain(&records.read.mapping).chain(suspects))?;
     // Reported before a minute of work.
-    for name in [Path::new("report.json"), Path::new("report.html"), &model] {
+    for name in [Path::new(REPORT_JSON), Path::new(REPORT_HTML), &model] {
         out.file(name)?;
     }
     let mut progress = progress();
@@ -139,8 +140,8 @@ fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Result<Exit, C
         print(&format!("The model was not judged on the held-out record: {why}\n"))?;
     }
     out.clear(&model)?;
-    out.write_json("report.json", report)?;
-    out.write("report.html", &page::page(report, pictures))?;
+    out.write_json(REPORT_JSON, report)?;
+    out.write(REPORT_HTML, &page::page(report, pictures))?;
     if let Some(extended) = extended {
         out.write(&model, extended)?;
     }

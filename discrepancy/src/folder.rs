@@ -3,7 +3,7 @@
 
 use crate::next::menu::MENU;
 use model_fit::ModelReport;
-use runlog::run_folder::write_whole;
+use runlog::run_folder::{REPORT_HTML, REPORT_JSON, write_whole};
 use serde::Serialize;
 use std::fs;
 use std::io;
@@ -47,14 +47,14 @@ impl Folder {
 
     /// Removes the results of an earlier close; `model` is the name of its model.
     pub(crate) fn clear(&self, model: &Path) -> Result<(), FolderError> {
-        if !self.path.join("report.json").exists() {
+        if !self.path.join(REPORT_JSON).exists() {
             return Ok(());
         }
         if let Some(earlier) = self.earlier_model().filter(|earlier| self.file(earlier).is_ok()) {
             self.remove(&earlier)?;
         }
         let proposed = MENU.iter().map(|entry| PathBuf::from(entry.file()));
-        for name in ["report.json", "report.html"].map(PathBuf::from).into_iter().chain(proposed) {
+        for name in [REPORT_JSON, REPORT_HTML].map(PathBuf::from).into_iter().chain(proposed) {
             self.remove(&name)?;
         }
         self.remove(model)
@@ -62,7 +62,7 @@ impl Folder {
 
     /// The file of a model of any plant that an earlier close wrote here.
     fn earlier_model(&self) -> Option<PathBuf> {
-        let text = fs::read_to_string(self.path.join("report.json")).ok()?;
+        let text = fs::read_to_string(self.path.join(REPORT_JSON)).ok()?;
         let ModelReport { model, named, discovered, .. } = serde_json::from_str(&text).ok()?;
         let name = Path::new(&model).file_name()?;
         (!named.is_empty() || !discovered.is_empty()).then(|| PathBuf::from(name))

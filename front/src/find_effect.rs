@@ -15,7 +15,7 @@ use crate::private::RunBus;
 use crate::{Front, FrontError, last_lines, logs, make_folder, say};
 use protocol::exit::Exit;
 use runlog::Axis;
-use runlog::run_folder::TRUTH_CSV;
+use runlog::run_folder::{REPORT_HTML, REPORT_JSON, TRUTH_CSV};
 use std::ffi::OsStr;
 use std::fs::{self, DirBuilder, File};
 use std::os::unix::fs::{DirBuilderExt, PermissionsExt};
@@ -151,13 +151,13 @@ impl Search<'_> {
         compare.args(["measured", "baseline", "extended", "repeated"].map(|run| folder.join(name).join(run)));
         self.call(compare.arg("--out").arg(folder.join("gap.html")), "no picture of the gap")?;
 
-        let report = judge::read(&workflow.join("report.json"))?;
+        let report = judge::read(&workflow.join(REPORT_JSON))?;
         let sealed = fs::read_to_string(&sealed).map_err(FrontError::input(&sealed))?;
         let judgement = judge::judge(&sealed, &report)?;
         let path = folder.join("told.txt");
         fs::write(&path, judgement.lines.join("\n") + "\n").map_err(FrontError::output(&path))?;
         judgement.lines.iter().for_each(|line| say(&format!("  {line}")));
-        say(&format!("  report: {}", workflow.join("report.html").display()));
+        say(&format!("  report: {}", workflow.join(REPORT_HTML).display()));
         Ok(judgement.right)
     }
 

@@ -14,7 +14,7 @@ use crate::{Front, FrontError, last_lines, logs, say};
 use protocol::exit::Exit;
 use runlog::conditions::Conditions;
 use runlog::run_folder::{
-    CONDITIONS_JSON, CYCLICTEST_JSON, PING_PONG_JSON, SCHEMA_VERSION, SUMMARY_JSON, write_json,
+    CONDITIONS_JSON, CYCLICTEST_JSON, PING_PONG_JSON, REPORT_JSON, SCHEMA_VERSION, SUMMARY_JSON, write_json,
 };
 use rustix::thread::{CpuSet, sched_getaffinity};
 use slices::{Slice, SliceRunner};
@@ -284,7 +284,7 @@ impl Measurement<'_> {
             }
             command
         };
-        let made = self.out.join("report.json");
+        let made = self.out.join(REPORT_JSON);
         let mut plain = report(&plain, &self.out, &plan.bounds);
         let mut code = self.runner.children.call(&mut plain)?;
         let mut table = Command::new(&self.runner.bench);
@@ -307,8 +307,8 @@ impl Measurement<'_> {
                     .front
                     .warn(&format!("warning: no report of the spinning runs; see {}", log.display())),
             }
-            if out.join("report.json").is_file() {
-                table.arg("--spin").arg(out.join("report.json"));
+            if out.join(REPORT_JSON).is_file() {
+                table.arg("--spin").arg(out.join(REPORT_JSON));
             }
         }
         if !made.is_file() {

@@ -15,7 +15,7 @@ use crate::{Front, FrontError, make_folder, say};
 use figures::{sum_up, thresholds};
 use protocol::exit::Exit;
 use runlog::Axis;
-use runlog::run_folder::SUMMARY_JSON;
+use runlog::run_folder::{GATEWAY_JSON, SUMMARY_JSON};
 use rustix::process::Pid;
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &RunArguments, front: &Front) -> Result<u8, FrontEr
         for_emulator(&mut emulate, arguments);
         if arguments.gateway {
             let mut gateway = Command::new(&bench);
-            gateway.args(["gateway", "--bus", &bus, "--report"]).arg(out.join("gateway.json"));
+            gateway.args(["gateway", "--bus", &bus, "--report"]).arg(out.join(GATEWAY_JSON));
             let _ = run.children.start(&mut gateway)?;
         }
         if arguments.watch {

@@ -10,7 +10,7 @@
 
 use super::hlog::{self, Interval};
 use super::{ReportError, ReportWithSources, jitterdebugger, markdown, page};
-use runlog::run_folder::write_json;
+use runlog::run_folder::{REPORT_HTML, REPORT_JSON, write_json};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
@@ -29,8 +29,8 @@ pub fn write(made: &ReportWithSources, folder: &Path, markdown_only: bool) -> Re
     if markdown_only {
         return Ok(());
     }
-    text("report.html", page::page(&made.report))?;
-    let path = folder.join("report.json");
+    text(REPORT_HTML, page::page(&made.report))?;
+    let path = folder.join(REPORT_JSON);
     write_json(&path, &made.report).map_err(|error| ReportError::write(&path, error))?;
     let path = folder.join("jitterdebugger.json");
     write_json(&path, &jitterdebugger::value(&made.sums, &made.runs))

@@ -43,6 +43,14 @@ pub const CYCLICTEST_JSON: &str = "cyclictest.json";
 pub const PING_PONG_JSON: &str = "ping-pong.json";
 /// Gaps that `bench probe` saw beside a run.
 pub const PROBE_CSV: &str = "probe.csv";
+/// Frames that the gateway carried and lost.
+pub const GATEWAY_JSON: &str = "gateway.json";
+/// What a program that evaluates runs or records found.
+pub const REPORT_JSON: &str = "report.json";
+/// The same as a page.
+pub const REPORT_HTML: &str = "report.html";
+/// Results of a soak.
+pub const SOAK_JSON: &str = "soak.json";
 /// Curves of a run.
 pub const PICTURE_SVG: &str = "picture.svg";
 /// Curves around a step.

@@ -7,7 +7,7 @@ use super::SoakError;
 use super::merged::MergedHistograms;
 use super::model::{SOAK_SCHEMA_VERSION, Segment, Settings, Soak, Totals};
 use super::{junit, procfs, verdict};
-use runlog::run_folder::{FileError, read_json, write_json, write_whole};
+use runlog::run_folder::{FileError, SOAK_JSON, read_json, write_json, write_whole};
 use rustix::fs::{FlockOperation, flock};
 use std::fs::File;
 use std::io;
@@ -38,7 +38,7 @@ impl SoakFolder {
         let lock_path = out.join("soak.lock");
         let lock = File::create(&lock_path).map_err(|error| SoakError::output(&lock_path, &error))?;
         flock(&lock, FlockOperation::NonBlockingLockExclusive).map_err(|_| SoakError::Busy(out.into()))?;
-        let path = out.join("soak.json");
+        let path = out.join(SOAK_JSON);
         let mut soak = if path.exists() {
             let soak: Soak = read_json(&path)?;
             if soak.schema_version != SOAK_SCHEMA_VERSION {
@@ -102,7 +102,7 @@ impl SoakFolder {
         soak.own_rss_kib = procfs::memory(std::process::id(), 0.0, false).map_or(0, |sample| sample.rss_kib);
         soak.distributions = self.merged.keep().map_err(|error| failed(&self.out, &error))?;
         (soak.trusted, soak.verdict) = verdict::of(soak);
-        let path = self.out.join("soak.json");
+        let path = self.out.join(SOAK_JSON);
         write_json(&path, soak).map_err(|error| failed(&path, &error))?;
         for (name, text) in [("soak-junit.xml", junit::text(soak)), ("soak.md", verdict::page(soak))] {
             let path = self.out.join(name);

@@ -8,6 +8,7 @@ use model_fit::{
     explained, extended, new_model, preview_records, read, simulate,
 };
 use pagekit::significant;
+use runlog::run_folder::{REPORT_HTML, REPORT_JSON};
 use serde::de::{DeserializeOwned, Error as _};
 use serde_json::{Error, Value};
 use std::fmt::Write as _;
@@ -19,7 +20,7 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
     let out = records.out.clone().unwrap_or_else(|| PathBuf::from("discrepancy-results"));
     let out = Folder::open(&out, [&records.rig].into_iter().chain(&records.train).chain(tests))?;
     let model = PathBuf::from(records.rig.file_name().unwrap_or("model.toml".as_ref()));
-    for name in [Path::new("report.json"), Path::new("report.html"), &model] {
+    for name in [Path::new(REPORT_JSON), Path::new(REPORT_HTML), &model] {
         out.file(name)?;
     }
     let mut progress = progress();
@@ -39,8 +40,8 @@ pub(super) fn close_command(arguments: &NameArguments, tests: &[PathBuf]) -> Res
         print(&format!("The model was not judged on the held-out record: {why}\n"))?;
     }
     out.clear(&model)?;
-    out.write_json("report.json", &closed.report)?;
-    out.write("report.html", &closed.page)?;
+    out.write_json(REPORT_JSON, &closed.report)?;
+    out.write(REPORT_HTML, &closed.page)?;
     if let Some(extended) = &closed.extended {
         out.write(&model, extended)?;
     }
