@@ -110,7 +110,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_file_and_line() {
+    fn a_bad_set_is_refused_with_file_and_line() {
         for (text, words) in [
             (
                 "[drive.algorithm]\ngain_per_s = \"5\"\n",

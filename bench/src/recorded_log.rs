@@ -125,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_line_is_told_with_file_line_and_column() {
+    fn a_wrong_line_is_refused_with_file_line_and_column() {
         let (_folder, file) = written("a.log", "(0.000001) a 120#\n(0.000002) a 120#0\n\n");
         let error = RecordedLog::read(&file, None).unwrap_err().to_string();
         assert!(error.contains("a.log:2:18: a byte has two digits"), "{error}");

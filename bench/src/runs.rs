@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn runs_of_one_name_are_told_apart_by_their_folders() {
+    fn runs_of_one_name_are_distinguished_by_their_folders() {
         let parent = tempfile::tempdir().unwrap();
         let folders = ["a", "b"].map(|sub| {
             std::fs::create_dir(parent.path().join(sub)).unwrap();

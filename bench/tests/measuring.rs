@@ -206,7 +206,7 @@ fn a_ping_pong_counts_each_ping_on_both_lines_and_adds_its_figures_to_one_file()
 }
 
 #[test]
-fn a_bus_without_a_host_is_told_with_the_remedy_and_a_strange_file_stays() {
+fn a_bus_without_a_host_is_reported_with_the_remedy_and_a_strange_file_stays() {
     let folder = tempfile::tempdir().unwrap();
     let ended = run(&format!("ping-pong {SHORT} --bus unix://{}/nobody", folder.path().display()));
     let output = reported(&ended.stderr);

@@ -168,7 +168,7 @@ mod tests {
     }
 
     #[test]
-    fn the_program_is_told_its_run_and_its_last_line_counts() {
+    fn the_program_is_given_its_run_and_its_last_line_counts() {
         let script = "read line; echo hello; echo \"{\\\"told\\\": \\\"$(echo $line | tr -d '\\\"')\\\", \\\"n\\\": 2}\"";
         let outcome = answer(script, 60.0);
         assert_eq!(outcome.ended, EndState::Done, "{outcome:?}");

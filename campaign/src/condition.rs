@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_the_rig_cannot_have_is_told_with_the_run() {
+    fn a_value_that_the_rig_cannot_have_is_refused_with_the_run() {
         let (inputs, points) = read(
             "title = \"t\"\nexperiment = \"step\"\n[[vary]]\nrig = \"friction.sliding_force_n\"\nlist = [26, 1e6]\n",
         );

@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_path_that_leads_nowhere_is_told_with_its_part() {
+    fn a_path_that_leads_nowhere_is_refused_with_its_part() {
         for (path, words) in [
             ("t", "a table"),
             ("a.b", "no table"),

@@ -227,7 +227,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn times_are_told_in_the_units_that_people_use() {
+    fn durations_are_printed_in_the_units_that_people_use() {
         let reported = [0.4, 59.0, 60.0, 3599.0, 3600.0, 90_000.0, 864_000.0].map(duration_text);
         assert_eq!(
             reported,

@@ -291,7 +291,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_what_would_be_right() {
+    fn a_bad_factor_is_refused_with_what_would_be_right() {
         for (text, words) in [
             ("rig = \"a.b\"", "either list"),
             ("rig = \"a.b\"\nlist = []", "at least one"),

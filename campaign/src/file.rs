@@ -304,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_file_line_and_what_would_be_right() {
+    fn a_bad_file_is_refused_with_file_line_and_what_would_be_right() {
         let after = |more: &str| format!("{PLAIN}{more}");
         let ask = |more: &str| format!("title = \"t\"\ncommand = [\"x\"]\n[collect]\n{more}\n");
         for (text, line, words) in [
@@ -337,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn a_command_is_told_its_values_by_name() {
+    fn a_command_is_given_its_values_by_name() {
         let text = "title = \"t\"\ncommand = [\"judge\"]\n[collect]\nfigures = [\"named\"]\n\
                     confusion = [[\"hidden\", \"named\"]]\n[[vary]]\nname = \"hidden\"\nlist = [\"a\", \"b\"]\n";
         let file = read(text).unwrap();

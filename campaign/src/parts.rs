@@ -209,7 +209,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_cut_changed_or_somebody_elses_is_told() {
+    fn a_truncated_changed_or_foreign_part_is_refused() {
         let out = tempfile::tempdir().unwrap();
         let ours = parts("c", "p");
         ours.write(out.path(), 0, "0,1\n").unwrap();

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn the_index_is_written_or_told_by_the_batch_system() {
+    fn the_index_is_written_or_given_by_the_batch_system() {
         let third = Ok(Shard { index: 2, count: 5 });
         assert_eq!(shard("2/5", None), third);
         assert_eq!(shard("5", Some(("SLURM_ARRAY_TASK_ID", "2"))), third);
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_shard_is_told_with_what_would_be_one() {
+    fn a_bad_shard_is_refused_with_what_would_be_one() {
         for bad in ["", "5/5", "-1/2", "0/0", "0", "a/b", "1/2/3"] {
             assert!(shard(bad, None).unwrap_err().to_string().contains("INDEX/COUNT"), "{bad}");
         }

@@ -169,7 +169,7 @@ fn specified(column: &str, factor: f64) -> f64 {
 }
 
 #[test]
-fn good_records_have_no_findings_and_their_noise_and_steps_are_told() {
+fn good_records_have_no_findings_and_their_noise_and_steps_are_estimated() {
     for sheet in [drive(), linked()] {
         let checked = sheet.checked();
         assert!(checked.report.usable && checked.report.findings.is_empty(), "{}", texts(&checked));

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rig_that_does_not_fit_is_told_with_its_key() {
+    fn a_rig_that_does_not_fit_is_refused_with_its_key() {
         for (key, number, hint) in [
             ("supply.pressure_bar", 10.5, ": 1050000 Pa; rig.dbc carries at most 1000000 Pa"),
             ("sensors.position_range_mm", 800.0, ": a range of 0.8 m"),

@@ -281,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn an_error_that_no_controller_told_is_computed_from_its_table() {
+    fn an_error_that_no_controller_reported_is_computed_from_its_table() {
         let folder = folder(&[("controller.json", json!({ "axes": { "drive": {} } }))]);
         let rows = "time_s,main_chain,set_position_m,position_m,moving\n0.0,experiment,0.2,0.197,1\n0.001,experiment,0.2,0.2,1\n";
         std::fs::write(folder.path().join("controller-drive.csv"), rows).unwrap();

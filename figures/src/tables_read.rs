@@ -166,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_read_is_told_with_its_line() {
+    fn a_malformed_table_is_refused_with_its_line() {
         for (text, hint) in [
             ("time_s,a\n0.0,x\n", "line 2: 'x'"),
             ("time_s,a\n0.0,NaN\n", "line 2: 'NaN'"),

@@ -235,7 +235,7 @@ mod tests {
     }
 
     #[test]
-    fn every_repetition_must_keep_a_bound_and_the_one_that_keeps_it_least_is_told() {
+    fn every_repetition_must_keep_a_bound_and_the_one_that_keeps_it_least_is_reported() {
         let summary = json!({
             "figures": { "force_settling_s": 0.12 },
             "figures_by_repetition": { "force_settling_s": [0.12, 0.08, null] },
@@ -253,7 +253,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_are_told_in_words() {
+    fn bounds_are_put_in_words() {
         for (passed, words) in [
             ("frames_lost = 3", "at most 3"),
             ("frames_lost = { least = 1 }", "at least 1"),
@@ -272,7 +272,7 @@ mod tests {
     }
 
     #[test]
-    fn a_wrong_key_or_bound_is_told_after_a_run_and_before() {
+    fn a_wrong_key_or_bound_is_refused_after_a_run_and_before() {
         for (passed, hint) in [
             ("frames_lots = 0", "no such figure"),
             ("force_setling_s = 0", "no such figure"),

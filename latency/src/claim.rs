@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn each_reason_is_told() {
+    fn each_reason_is_reported() {
         type RunEdit = fn(&mut RunFiles);
         let cases: [(&str, RunEdit); 18] = [
             ("SCHED_FIFO", |run| {

@@ -151,7 +151,7 @@ mod tests {
     }
 
     #[test]
-    fn a_change_is_told_against_the_first_group_with_whether_it_is_noise() {
+    fn a_change_is_reported_against_the_first_group_with_whether_it_is_noise() {
         let reported = compare(&runs(&[100, 102, 98, 101], &[150, 149, 152, 151])).unwrap();
         assert_eq!(reported.groups, ["before", "after"]);
         let row = &reported.rows[0];
@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn groups_that_overlap_are_noise_and_small_ones_cannot_be_told() {
+    fn groups_that_overlap_are_noise_and_small_ones_are_undecided() {
         let noise = compare(&runs(&[100, 120, 110, 130], &[105, 125, 115, 135])).unwrap();
         assert_eq!(noise.rows[0].cells[1].beyond_noise, Some(false));
         let few = compare(&runs(&[100, 101, 102], &[200, 201, 202])).unwrap();

@@ -163,7 +163,7 @@ mod tests {
     use crate::made_up;
 
     #[test]
-    fn machine_facts_are_flattened_and_told_once() {
+    fn machine_facts_are_flattened_and_reported_once() {
         let reported = conditions(&[made_up::run(10), made_up::run(10)]);
         let value = |name: &str| {
             reported.machine.iter().find(|fact| fact.name == name).map(|fact| fact.value.as_str())
@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn facts_that_differ_are_all_told() {
+    fn facts_that_differ_are_all_reported() {
         let mut other = made_up::run(10);
         made_up::edit_run(&mut other, |file| file["machine"]["kernel"] = "another".into());
         let reported = conditions(&[made_up::run(10), other]);

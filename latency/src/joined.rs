@@ -113,7 +113,7 @@ mod tests {
     use crate::made_up;
 
     #[test]
-    fn latencies_are_told_each_way_and_for_each_axis() {
+    fn latencies_are_reported_each_way_and_for_each_axis() {
         let run = made_up::run(1000);
         let reported = one_way(&run);
         let tags: Vec<_> = reported.series.keys().map(String::as_str).collect();

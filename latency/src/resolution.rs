@@ -160,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_of_pairs_are_told_with_two_digits() {
+    fn numbers_of_pairs_are_rounded_up_to_two_digits() {
         assert_eq!([7, 40, 335, 11_111, 99_999].map(two_digits), [7, 40, 340, 12_000, 100_000]);
     }
 }

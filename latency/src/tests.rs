@@ -118,7 +118,7 @@ fn only_the_markdown_is_written_when_asked() {
 }
 
 #[test]
-fn what_is_missing_or_damaged_is_told_and_the_rest_is_used() {
+fn what_is_missing_or_damaged_is_reported_and_the_rest_is_used() {
     let folder = tempfile::tempdir().unwrap();
     made_up::write(&made_up::run(500), folder.path());
     std::fs::remove_file(folder.path().join("summary.json")).unwrap();

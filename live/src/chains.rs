@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn active_states_are_told_by_name() {
+    fn active_states_are_reported_by_name() {
         let frame = Frame::from_values(DRIVE_CHAIN_STATUS.id, &[5.0, 2.0, 3.0, 0.0, 1.0, 9.0, 0.0]);
         let Some(Frame::DriveChainStatus(status)) = frame else { panic!("{frame:?}") };
         let reported = active(status);

@@ -258,7 +258,7 @@ mod tests {
     }
 
     #[test]
-    fn an_answer_that_does_not_come_is_told_in_time() {
+    fn an_answer_that_does_not_come_is_a_gateway_timeout() {
         let (mut client, mut far) = pair();
         ask(&mut client, &mut far, 1000);
         client.write(1000 + ANSWER_MS - 1);

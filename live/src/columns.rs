@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sum_is_none_unless_all_of_it_is_told() {
+    fn a_sum_is_none_unless_all_its_terms_are_recorded() {
         let place = |name: &str| COLUMNS.iter().position(|column| column.name == name).unwrap();
         let friction = place("load_friction_force_n");
         let names = ["load_viscous_friction_N", "load_sliding_friction_N", "load_holding_force_N"];

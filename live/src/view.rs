@@ -445,7 +445,7 @@ mod tests {
     }
 
     #[test]
-    fn lost_records_are_told() {
+    fn lost_records_are_reported() {
         let mut view = View::new(None);
         described(&mut view, DroppedEvents::default());
         view.packet(Packet::Loss(7));

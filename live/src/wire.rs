@@ -387,7 +387,7 @@ mod tests {
     }
 
     #[test]
-    fn a_rig_that_starts_anew_is_told() {
+    fn a_restart_of_the_rig_is_reported() {
         let mut wire = wire(58, &[], 0);
         assert_eq!(wire.take(&tick(160, 0), 0), Some(WireEvent::Cycle(160, false)));
         assert_eq!(wire.take(&tick(0, 0), 0), Some(WireEvent::Cycle(0, true)));
@@ -405,7 +405,7 @@ mod tests {
     };
 
     #[test]
-    fn what_a_hand_does_not_give_stays_as_the_controller_told_it() {
+    fn what_a_hand_does_not_give_stays_as_the_controller_reported_it() {
         let mut wire = Wire::default();
         let axis = HandSetPointAxis::Load;
         assert_eq!(wire.hand_set_point(axis, None, Some(150.0)), None, "nobody knows where it stands");

@@ -171,7 +171,7 @@ fn a_model_that_lacks_nothing_names_nothing() {
 }
 
 #[test]
-fn two_suspects_with_the_same_law_cannot_be_told_apart() {
+fn two_suspects_with_the_same_law_are_indistinguishable() {
     let folder = tempfile::tempdir().unwrap();
     let twin = OSCILLATOR.replace(
         "[[suspects]]\nname = \"quadratic-damping\"",

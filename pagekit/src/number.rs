@@ -182,7 +182,7 @@ mod tests {
     }
 
     #[test]
-    fn figures_are_told_in_the_units_of_people() {
+    fn figures_are_printed_in_customary_units() {
         for (value, unit, expected) in [
             (0.002_147_3, "m", "2.147 mm"),
             (0.0871, "s", "87.10 ms"),

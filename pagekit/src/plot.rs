@@ -267,7 +267,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_are_round_and_told_apart() {
+    fn ticks_are_round_and_distinct() {
         let of = |low, high| ticks(&Scale::linear((low, high), (0.0, 1.0)), 7.0);
         let texts = of(-3.0, 61.0).into_iter().map(|(_, text)| text).collect::<Vec<_>>();
         assert_eq!(texts, ["0", "10", "20", "30", "40", "50", "60"]);

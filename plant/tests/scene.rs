@@ -129,7 +129,7 @@ fn a_bad_scene_is_refused_with_file_line_key_value_and_range() {
 }
 
 #[test]
-fn a_scene_is_told_in_the_files_own_words() {
+fn a_scene_is_serialised_with_the_keys_of_its_file() {
     let read = scene(
         "[[rig.hand]]\non = \"load-eye\"\nfrom_s = 0\nto_s = 1\nforce_n = 60\n\
          [[rig.event]]\nat_s = 2\ndo = \"emergency-stop\"\n[[rig.event]]\nat_s = 3\ndo = \"link\"\nuntil_s = 4\n",
@@ -249,7 +249,7 @@ fn a_link_is_tried_until_the_eye_passes_the_gap() {
 }
 
 #[test]
-fn a_link_that_never_succeeded_is_told_once_when_its_time_is_up() {
+fn a_link_that_never_succeeded_is_reported_once_when_its_time_is_up() {
     let played = passing(0.25);
     assert_eq!(played.reported, [(250, Outcome::LinkGivenUp)]);
     assert!(!played.plant.linked());

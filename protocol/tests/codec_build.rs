@@ -48,7 +48,7 @@ fn the_committed_frames_are_generated_from_rig_dbc() {
 }
 
 #[test]
-fn each_problem_is_told_with_file_and_line() {
+fn each_problem_is_reported_with_file_and_line() {
     let valve = "BO_ 272 ";
     let cases = [
         (valve, "0|12@1-", "0|12@@1-", "expected"),
@@ -80,7 +80,7 @@ fn each_problem_is_told_with_file_and_line() {
 }
 
 #[test]
-fn problems_of_attributes_are_told_at_their_message() {
+fn problems_of_attributes_are_reported_at_their_message() {
     let line_of = |text: &str| RIG[..RIG.find(text).unwrap()].matches('\n').count() + 1;
     let cases = [
         ("BA_ \"GenMsgCycleTime\" BO_ 304 10;", "", "BO_ 304 Tick", "GenMsgCycleTime is not set"),

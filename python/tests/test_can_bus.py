@@ -64,7 +64,7 @@ def test_own_frames_come_back_in_their_place_and_are_marked(bus_path, pair):
     assert one.recv(0.05) is None
 
 
-def test_own_frames_are_told_apart_though_filters_or_the_host_keep_some_of_them_back(bus_path, pair):
+def test_own_frames_are_distinguished_though_filters_or_the_host_keep_some_of_them_back(bus_path, pair):
     one, _ = pair
     filters = [{"can_id": 0x200, "can_mask": 0x7FF, "extended": False}]
     with can.Bus(interface="airbench", channel=bus_path, receive_own_messages=True, can_filters=filters) as own:

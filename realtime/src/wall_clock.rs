@@ -82,7 +82,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_step_is_told_once_and_a_slew_never() {
+    fn a_step_is_reported_once_and_a_slew_never() {
         let mut watch = WallClockWatch { began: Instant::from_nanos(0), offset_ns: 1_000_000_000 };
         let at = |ms: u64| Instant::from_nanos(ms * 1_000_000);
         assert_eq!(watch.judge(at(4), 1_000_002_000), None);

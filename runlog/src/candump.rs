@@ -192,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_by_column() {
+    fn a_malformed_line_is_refused_with_its_column() {
         for (line, column, words) in [
             ("", 1, "begins with"),
             ("(1.0 bus0 120#00", 2, "ends with ') '"),

@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn a_joined_summary_keeps_what_it_does_not_name_and_lacks_what_nobody_told() {
+    fn a_joined_summary_keeps_unknown_keys_and_lacks_what_nobody_reported() {
         let ages = serde_json::json!({ "drive": { "1": 2 } });
         let written =
             serde_json::json!({ "passed": true, "of_another_version": [1], "command_age_cycles": ages });
@@ -462,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn what_controllers_told_goes_through_a_joined_summary() {
+    fn what_controllers_reported_goes_through_a_joined_summary() {
         let by_controllers = ReportedByControllers {
             controller: Some(ControllerFigures { ended_well: Some(true), ..ControllerFigures::default() }),
             ..ReportedByControllers::default()

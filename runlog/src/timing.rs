@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_its_place() {
+    fn a_malformed_table_is_refused_with_its_place() {
         assert!(matches!(read("a,b\n"), Err(TableError::Head(_))));
         let head = names().join(",");
         let reported = read(&format!("{head}\n1,2\n")).unwrap_err().to_string();

@@ -277,7 +277,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_value_out_of_range_is_told_with_name_value_unit_and_range() {
+    fn a_value_out_of_range_is_refused_with_name_value_unit_and_range() {
         let gain = Parameter::new(("gain_per_s", "1/s"), [0.0, 200.0], 25.0, "velocity for each error");
         assert_eq!(gain.check(200.0), Ok(200.0));
         for bad in [-0.1, 200.1, f64::NAN, f64::INFINITY] {
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn a_parameter_without_a_unit_is_told_without_a_space_in_its_place() {
+    fn a_parameter_without_a_unit_is_printed_without_a_space_in_its_place() {
         let share = Parameter::new(("share", ""), [0.0, 2.0], 1.0, "share");
         assert_eq!(share.check(3.0).unwrap_err().to_string(), "share = 3; allowed is 0 to 2");
     }

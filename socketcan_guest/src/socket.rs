@@ -283,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_queue_does_not_take_is_counted_and_told_with_the_next_frame() {
+    fn frames_dropped_at_the_queue_are_counted_and_reported_with_the_next_frame() {
         let (mut socket, guest_end) = new();
         while socket.dropped < 3 {
             socket.deliver(&[1; 16], METADATA);

@@ -155,7 +155,7 @@ fn an_interrupted_start_says_so_and_goes_on() {
 }
 
 #[test]
-fn parts_that_are_not_whole_or_not_ours_are_told_and_never_merged() {
+fn truncated_and_foreign_parts_are_refused_and_never_merged() {
     let place = CampaignFolder::new(SMALL);
     let whole = undisturbed(&place);
     let path = place.path("whole/parts/000002.csv");

@@ -275,7 +275,7 @@ fn each_way_of_breaking_the_contract_is_named_with_what_follows_from_it_and_noth
 
 /// Nothing of what is left tells a process that has ended from a controller that keeps its valve shut.
 #[test]
-fn a_process_that_has_ended_is_told_in_every_session() {
+fn a_process_that_has_ended_is_reported_in_every_session() {
     let (failed, ended) = broken(Fault::None, &["true"]);
     let sessions = ["emergency-stop", "regular", "sensor-loss"];
     assert_eq!(failed, sessions.map(|session| format!("{session} to-the-end")), "{}", ended.stdout);
@@ -284,7 +284,7 @@ fn a_process_that_has_ended_is_told_in_every_session() {
 }
 
 #[test]
-fn a_controller_that_is_not_there_or_never_moves_is_told_so() {
+fn a_controller_that_is_not_there_or_never_moves_is_reported() {
     let scene = Scene::new(SHORT);
     let ended = check(&scene, "--pace real --patience 0.2", &["true"]).wait().expect_code(1);
     assert_eq!(that(&results(&scene, &ended), "passed"), [""; 0]);

@@ -225,7 +225,7 @@ fn the_steps_before_a_report_run_alone() {
 }
 
 #[test]
-fn lost_rows_a_hole_and_a_saturated_channel_are_told_and_survived() {
+fn lost_rows_a_hole_and_a_saturated_channel_are_reported_and_survived() {
     let folder = tempfile::tempdir().expect("a folder");
     let record = spoilt(folder.path(), |row, mut cells| {
         // 1 % of the rows here and there, 50 ms in one piece.

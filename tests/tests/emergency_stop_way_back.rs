@@ -246,7 +246,7 @@ fn a_partner_that_was_lost_and_is_back_lets_the_run_begin_anew_after_the_release
 }
 
 #[test]
-fn nobody_is_told_to_start_while_the_stop_is_held() {
+fn nothing_starts_or_is_released_while_the_stop_is_held() {
     let scene = Scene::new(&FAST.replace("\"end\"", "\"restart\""));
     let held = run(&scene, |cycle| (cycle == TRIP).then(|| stop(false)));
     held.expect_code(1).expect_stderr(&["drive: the emergency stop is tripped"]);

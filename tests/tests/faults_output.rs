@@ -11,7 +11,7 @@ use system_tests::{
 /// No file grows beyond some hundred KiB; the signal that comes with it is ignored, so that writing fails instead.
 const SMALL_FILES: &str = "trap '' XFSZ && ulimit -f 300";
 
-fn expect_told(ended: CompletedProcess, folder: &Path) {
+fn expect_write_error(ended: CompletedProcess, folder: &Path) {
     let folder = folder.display().to_string();
     ended.expect_code(BAD_INPUT).expect_stderr(&["cannot write", &folder, "free space", "--out"]);
 }
@@ -25,7 +25,7 @@ fn an_emulator_whose_file_cannot_grow_ends_the_run_and_keeps_whole_lines() {
         let scene = Scene::new(RESTLESS);
         let emulator = scene.emulator(pace).after_shell(SMALL_FILES).start();
         let controller = scene.controller(pace).with("--repeat --bus-grace 2").start();
-        expect_told(emulator.wait(), &scene.path("emulator"));
+        expect_write_error(emulator.wait(), &scene.path("emulator"));
         controller.wait().expect_code(0);
         let rows = expect_whole_lines(&scene.path("emulator/measurement.csv"));
         assert!(rows > 100, "what fitted was written: {rows} rows, {pace:?}");
@@ -41,7 +41,7 @@ fn a_controller_whose_file_cannot_grow_ends_and_the_rig_shuts_its_valve() {
     let scene = Scene::new(RESTLESS);
     let mut emulator = scene.emulator(Pace::Real).with("--seconds 20").start();
     let controller = scene.controller(Pace::Real).with("--repeat").after_shell(SMALL_FILES).start();
-    expect_told(controller.wait(), &scene.path("controller"));
+    expect_write_error(controller.wait(), &scene.path("controller"));
     emulator.wait_for("no fresh drive command for 20 cycles, valve shut");
     assert!(expect_whole_lines(&scene.path("controller/controller-drive.csv")) > 100);
     assert_eq!(scene.report()["ended_because"], "the output could not be written");
@@ -58,7 +58,7 @@ fn a_full_disk_ends_the_run_and_keeps_whole_lines() {
     let folder = disk.path.join("run");
     let emulator = scene.emulator(Pace::Real).out(&folder).start();
     let controller = scene.controller(Pace::Real).with("--repeat").start();
-    expect_told(emulator.wait(), &folder);
+    expect_write_error(emulator.wait(), &folder);
     controller.wait().expect_code(0);
     assert!(expect_whole_lines(&folder.join("measurement.csv")) > 100);
     let _ = expect_whole_lines(&folder.join("truth.csv"));

@@ -11,7 +11,7 @@ const NO_LIMITS_RAISED: &str = "ulimit -r 0 && ulimit -l 64";
 const NOT_DONE: &str = "the rig ended before the experiment was done";
 
 #[test]
-fn a_user_without_privileges_is_told_the_remedy_and_the_run_succeeds() {
+fn missing_privileges_are_reported_with_the_remedy_and_the_run_succeeds() {
     let _machine = turn::take();
     let scene = Scene::new(SHORT);
     let mut emulator = scene.emulator(Pace::Real).with("--seconds 10").after_shell(NO_LIMITS_RAISED);

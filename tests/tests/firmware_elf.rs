@@ -327,7 +327,7 @@ fn patched(folder: &Path, function: &str, instruction: u16) -> PathBuf {
 }
 
 #[test]
-fn a_fault_and_the_end_of_main_are_told_and_no_silence() {
+fn a_fault_and_the_end_of_main_are_reported() {
     const UDF: u16 = 0xDE00;
     const BX_LR: u16 = 0x4770;
     for (function, instruction, words) in [

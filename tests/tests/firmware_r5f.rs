@@ -182,7 +182,7 @@ fn the_check_of_controllers_passes_its_function() {
 }
 
 #[test]
-fn gdb_stops_it_while_the_rig_goes_on_and_a_fault_is_told() {
+fn gdb_stops_it_while_the_rig_goes_on_and_a_fault_is_reported() {
     let _turn = turn::take();
     let scene = scene();
     let emulator = scene.emulator(Pace::Real).with("--seconds 200").start();

@@ -190,7 +190,7 @@ fn with_console(scene: &Scene) -> Running {
 }
 
 #[test]
-fn what_is_typed_is_done_told_and_recorded() {
+fn typed_commands_are_executed_answered_and_recorded() {
     let scene = Scene::new(SHORT);
     let mut emulator = with_console(&scene);
     let peer = scene.peer();

@@ -354,7 +354,7 @@ fn what_is_no_log_is_refused_by_line_and_column_and_leaves_no_file() {
 }
 
 #[test]
-fn frames_that_are_no_signals_are_told_and_a_python_without_python_can_too() {
+fn frames_without_signals_and_a_python_without_python_can_are_reported() {
     let scene = Scene::new(SHORT);
     let log = scene.write("odd.log", "(0.1) a 7F0#00\n(0.2) a 110#0000000000\n(0.3) a 160#0100\n");
     let said = export(&log, "csv", &scene.path("odd.csv"), &[]).expect_code(0);

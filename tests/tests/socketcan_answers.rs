@@ -111,7 +111,7 @@ fn emulator_and_controller_say_and_send_on_it_what_they_do_on_vcan() {
 }
 
 #[test]
-fn sockets_are_told_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan() {
+fn sockets_report_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
     let running = start(&scene, "", &[&built("socketcan-answers"), &"vcan0", &"down"]);
@@ -125,7 +125,7 @@ fn sockets_are_told_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan(
 }
 
 #[test]
-fn a_listener_is_told_that_the_bus_went_down_as_on_vcan() {
+fn a_listener_ends_with_network_is_down_as_on_vcan() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
     let mut told = start(&scene, "", &[&"candump", &"vcan0"]);

@@ -108,7 +108,7 @@ fn a_program_that_does_not_notice_the_end_of_its_bus_is_ended_with_it() {
 }
 
 #[test]
-fn interfaces_of_several_buses_are_told_apart() {
+fn interfaces_of_several_buses_are_distinguished() {
     let (scene, other) = (Scene::new(SHORT), Scene::new(SHORT));
     let (_one, _two) = (scene.bus_host(""), other.bus_host(""));
     let options = format!("--interface can0={} --interface can1={}", scene.url(), other.url());
@@ -229,7 +229,7 @@ fn what_cannot_be_is_said_with_what_to_do() {
 
 /// As in a container: Docker's default profile refuses the second to whoever has no CAP_SYS_PTRACE.
 #[test]
-fn a_sandbox_that_forbids_it_is_told_with_what_to_allow() {
+fn a_sandbox_that_forbids_it_is_reported_with_what_to_allow() {
     // Numbers of system calls on x86-64.
     const SECCOMP: i32 = 317;
     const PIDFD_GETFD: i32 = 438;

@@ -41,7 +41,7 @@ fn expect_rows_of_the_files(scene: &Scene, reported: &ReceivedTelemetry) {
 }
 
 #[test]
-fn a_viewer_is_told_what_the_files_hold() {
+fn a_viewer_receives_what_the_files_hold() {
     let _machine = turn::take();
     let scene = Scene::new(RESTLESS);
     let emulator = with_telemetry(&scene, Pace::Real).with("--seconds 3.5 --seed 7").start();

@@ -160,7 +160,7 @@ impl CardRun {
     }
 
     /// A card loses what its receive FIFO does not take, and then says so: once for one frame or more. Both directions.
-    fn losses_on_the_wire_are_told_by_the_cards(&self) {
+    fn losses_on_the_wire_are_counted_by_the_cards(&self) {
         for (sender, receiver) in [(&self.can0, &self.can1), (&self.can1, &self.can0)] {
             let lost = sender.sent.checked_sub(receiver.received).expect("a frame that nobody sent");
             assert!(
@@ -188,7 +188,7 @@ fn every_frame_on_the_cards_is_accounted_for(guest: &Guest, run: &Path) {
     assert_eq!(count(&on.summary, "/bus/sent"), on.can0.sent);
     assert_eq!((count(&on.controller, "/bus/sent"), on.can1.sent), (from_controllers, from_controllers));
     assert_eq!((on.can1.received, on.can1.dropped), (from_rig, 0));
-    on.losses_on_the_wire_are_told_by_the_cards();
+    on.losses_on_the_wire_are_counted_by_the_cards();
     on.overruns_reach_the_programs();
 
     // Heard by the programs: all that came; what came before the controllers listened, or after they left, is excused.

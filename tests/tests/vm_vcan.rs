@@ -177,7 +177,7 @@ fn the_c_firmware_positions_on_vcan_and_canplayer_replays_a_log() {
 }
 
 #[test]
-fn foreign_programs_and_a_bus_that_goes_down_are_told_and_survived() {
+fn foreign_programs_and_a_bus_that_goes_down_are_counted_and_survived() {
     let guest = machine();
     ended_with(guest, &FOREIGN_CODES);
     let run = guest.out();

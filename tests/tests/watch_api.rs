@@ -55,7 +55,7 @@ fn numbers(values: &Value) -> Vec<f64> {
 }
 
 #[test]
-fn a_run_is_told_by_description_state_history_events_and_metrics() {
+fn a_run_is_served_as_description_state_history_events_and_metrics() {
     let _machine = turn::take();
     let watched = WatchedRun::start(RESTLESS, "");
     let page = &watched.page;

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_and_the_key_is_not() {
+    fn a_bad_file_is_refused_and_the_key_is_not_printed() {
         let bad = "c0ffeec0ffeec0ffeec0ffeec0ffeezz";
         for (text, words) in [
             (format!("key = \"{bad}\""), "two digits each"),

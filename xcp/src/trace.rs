@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn slopes_are_told_apart() {
+    fn slopes_are_distinguished() {
         // Up at 10, down at 20.
         let pulse = |cycle| if (10..20).contains(&cycle) { 60.0 } else { 0.0 };
         for (slope, trigger) in [(0.0, 10), (1.0, 20), (2.0, 10), (3.0, 3)] {

@@ -112,7 +112,7 @@ fn what_a_row_is_of_follows_from_its_laws_and_their_keys() {
 }
 
 #[test]
-fn a_bad_value_is_told_with_file_line_key_value_and_range() {
+fn a_bad_value_is_refused_with_file_line_key_value_and_range() {
     let bad: [(&str, &str, &[&str]); 22] = [
         ("start_m = 0.1", "start_m = 0.6", &["e.toml:11: drive.start_m = 0.6 m", "0 to 0.5 m"]),
         ("start_m = 0.1", "start = 0.1", &["e.toml:9: drive.start_m is missing", "0 to 0.5 m", "start"]),

@@ -269,7 +269,7 @@ opening_limit = 0.5
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_file_line_key_value_and_what_is_allowed() {
+    fn a_bad_value_is_refused_with_file_line_key_value_and_what_is_allowed() {
         for (good, bad, hints) in [
             (
                 "gain_per_s = 20",

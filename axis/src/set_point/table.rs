@@ -226,7 +226,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bad_table_is_told_with_file_and_line() {
+    fn a_bad_table_is_refused_with_file_and_line() {
         for (csv, hints) in [
             ("", ["way.csv:1", "empty"]),
             ("time_s,x\n0,0.1\n1,0.2\n", ["way.csv:1", "position_m or force_N"]),

@@ -178,7 +178,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_with_a_command_is_told_apart() {
+    fn errors_of_a_command_are_distinguished() {
         let good = command(0, 0);
         let with = |change: &dyn Fn(&mut Vec<u8>), sum: bool| {
             let mut data = good.data()[..4].to_vec();

@@ -129,7 +129,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_row_is_told_with_its_line() {
+    fn a_malformed_row_is_refused_with_its_line() {
         for (text, reason) in [
             ("a,time_s\n", "line 1: the first column is not time_s"),
             ("time_s,a\n0.001\n", "line 2: 1 values where 2 are expected"),

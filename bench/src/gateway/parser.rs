@@ -223,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_too_long_is_passed_over_and_told_once() {
+    fn an_overlong_request_is_skipped_and_refused_once() {
         let long = format!("< open {} >< echo >", "a".repeat(10_000));
         assert_eq!(all(long.as_bytes()), [Err(Refusal::TooLong), Ok(Request::Echo)]);
         let name = "a".repeat(LONGEST_NAME + 1);

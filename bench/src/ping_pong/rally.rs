@@ -176,7 +176,7 @@ mod tests {
     }
 
     #[test]
-    fn an_end_that_is_gone_is_told_and_a_signal_ends_the_waiting() {
+    fn a_disconnected_end_is_reported_and_a_signal_ends_the_waiting() {
         let [mut ours, theirs] = pair();
         let interrupt = Interrupt::default();
         interrupt.ask();

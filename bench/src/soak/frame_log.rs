@@ -92,7 +92,7 @@ mod tests {
     }
 
     #[test]
-    fn identifiers_are_counted_and_the_first_and_last_counter_told() {
+    fn identifiers_are_counted_and_the_first_and_last_counter_reported() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("bus.log");
         let sensors = "(0000000012.000000) bus0 120#0102030405060708\n";

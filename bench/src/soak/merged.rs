@@ -144,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn a_half_line_is_left_out_and_a_damaged_one_told() {
+    fn a_half_line_is_left_out_and_a_damaged_one_reported() {
         let folder = segment(&[1000]);
         let path = folder.path().join("emulator.hlog");
         let text = std::fs::read_to_string(&path).unwrap();

@@ -90,7 +90,7 @@ fn a_library_that_hangs_is_given_up_after_the_limit() {
 }
 
 #[test]
-fn what_is_no_library_and_what_is_not_there_is_told_so() {
+fn a_file_that_is_no_library_and_a_missing_one_are_refused() {
     let libraries = Libraries::new();
     let text = libraries.place("text.so");
     std::fs::write(&text, "not a library").unwrap();

@@ -189,7 +189,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_move_has_no_noise_that_can_be_told() {
+    fn a_constant_channel_has_no_noise_estimate() {
         assert_eq!(of(&vec![Some(1.0); 3000]), None);
         assert_eq!(of(&[None; 3000]), None);
     }

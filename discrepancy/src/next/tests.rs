@@ -168,7 +168,7 @@ fn what_is_proposed_does_not_change_from_run_to_run_and_says_why() {
 }
 
 #[test]
-fn explanations_that_are_one_are_never_told_apart() {
+fn identical_explanations_are_never_distinguished() {
     let rig = RigParameters::baseline();
     let one = explained(&[("inclination", "drive", &[("force_n", 5.0)])]);
     let noise = ReadingNoise::specified(&rig);

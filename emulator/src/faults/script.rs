@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_wrong_is_told_with_line_key_value_and_what_is_allowed() {
+    fn a_bad_script_is_refused_with_line_key_value_and_what_is_allowed() {
         let (none, fault) = ("", "[[fault]]\n");
         let stuck = "[[fault]]\nname = \"valve-stuck\"\nat = \"drive\"\n";
         let offset = "[[fault]]\nname = \"valve-offset\"\nat = \"drive\"\n";

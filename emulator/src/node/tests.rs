@@ -102,7 +102,7 @@ fn a_writer_that_does_not_write_is_waited_for_once_in_a_stall_and_one_that_is_go
 
 /// A rig that stood still while its interface went down and came back never saw it down, and reported nothing.
 #[test]
-fn a_bus_that_went_and_came_back_between_two_looks_is_told_of() {
+fn a_bus_lost_and_back_between_two_cycles_is_reported() {
     let (mut node, records) = node("");
     let mut bus = EmptyBus::default();
     node.publish(0, false, &mut bus);

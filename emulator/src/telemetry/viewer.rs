@@ -139,7 +139,7 @@ mod tests {
     }
 
     #[test]
-    fn a_viewer_that_stands_still_loses_whole_records_and_is_told_how_many() {
+    fn a_viewer_that_does_not_read_loses_whole_records_and_receives_their_number() {
         let (mut viewer, mut far) = pair();
         let mut record = Vec::new();
         write_cycle(&mut record, 0, [0.0; 100]);

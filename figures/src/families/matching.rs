@@ -35,7 +35,7 @@ mod tests {
     use crate::record::made::{chain, each_ms, table};
 
     #[test]
-    fn offset_and_what_is_left_are_told() {
+    fn offset_and_residual_are_computed() {
         let position_m = each_ms(0.0, 2.0, |time| 0.3008 - if time < 1.0 { 0.0 } else { 0.00075 });
         let mut load = table(&[("position_m", &position_m)]);
         load.set_states("matching_chain", chain(&[("averaging", 0.0), ("matched", 1.0), ("", 2.0)]));

@@ -110,7 +110,7 @@ fn parameters_are_set_together_and_only_before_the_start() {
 }
 
 #[test]
-fn what_does_not_fit_together_is_told_when_the_plant_is_set_up() {
+fn inconsistent_parameters_are_refused_when_the_plant_is_set_up() {
     let mut simulation = baseline();
     set(&mut simulation, "supply.check_valve_pressure_bar", 6.0).unwrap();
     set(&mut simulation, "supply.pressure_bar", 5.0).unwrap();
@@ -138,7 +138,7 @@ fn values_out_of_range_outputs_and_strangers_cannot_be_set() {
 }
 
 #[test]
-fn rods_that_are_apart_are_not_linked_and_that_is_told_once() {
+fn rods_that_are_apart_are_not_linked_and_that_is_reported_once() {
     let mut simulation = started();
     let link = reference(&simulation, "link");
     simulation.set_booleans(&[link], &[true]).unwrap();

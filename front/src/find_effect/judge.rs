@@ -201,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn effects_and_terms_of_a_sealed_file_are_told_with_what_is_written() {
+    fn effects_and_terms_of_a_sealed_file_are_listed_with_what_is_written() {
         let sealed = "[effects.piston-leakage.load]\nleakage_nl_per_min = 5.89\nshare = 0.5\n\n[effects.a.drive.x]\n\
                       [[terms]]\nname = 'brake'\nplace = 'drive.force'\nadd = '-(30[N s/m])*v'\n";
         let read: Vec<(String, String)> = HiddenItem::of(sealed)

@@ -131,7 +131,7 @@ fn many_faults_are_a_cause_and_a_few_are_not() {
 }
 
 #[test]
-fn slow_work_is_told_apart_from_a_machine_that_stood_still() {
+fn slow_work_is_distinguished_from_a_machine_that_stood_still() {
     let mut run = made_up::run(500);
     made_up::slow(&mut run, "emulator", 100, 2_000_000);
     let event = one(&run);
@@ -161,7 +161,7 @@ fn late_cycles_in_a_row_are_one_event_and_the_worst_events_come_first() {
 }
 
 #[test]
-fn waiting_that_is_no_cause_is_told_as_it_was() {
+fn waiting_that_is_no_cause_is_reported_as_it_was() {
     let mut run = made_up::run(500);
     made_up::stall(&mut run, "emulator", 100, 3_700_000).vitals.run_delay_ns = 951_000;
     let event = one(&run);

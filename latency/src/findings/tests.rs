@@ -75,7 +75,7 @@ fn contention_of(waits_ns: &[u64]) -> Finding {
 }
 
 #[test]
-fn contention_is_always_told_and_named_when_it_comes_back() {
+fn contention_is_always_reported_and_named_when_it_comes_back() {
     let single = contention_of(&[9_000_000]);
     assert_eq!((single.cause, single.by_itself), (Cause::CpuContention, true));
     assert_eq!(single.explained_ns, 9_000_000);

@@ -423,7 +423,7 @@ mod tests {
     }
 
     #[test]
-    fn a_foreign_controller_without_an_answer_to_give_is_told_at_the_end_of_the_members_turn() {
+    fn a_foreign_controller_without_an_answer_is_reported_at_the_end_of_the_members_turn() {
         let unanswering = |barrier: &Barrier| barrier.unanswering().collect::<Vec<_>>();
         let mut barrier = started_with_stranger();
         barrier.lost(&frame(DRIVE_SENSORS.id), None);

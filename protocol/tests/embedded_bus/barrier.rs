@@ -225,7 +225,7 @@ fn a_member_that_leaves_does_not_hold_the_barrier() {
 }
 
 #[test]
-fn the_rig_is_told_the_name_of_a_member_that_is_never_done() {
+fn the_rig_receives_the_name_of_a_member_that_is_never_done() {
     // Both at once, because each takes the 5 s of the contract.
     std::thread::scope(|scope| {
         for rig_at in [RigAt::Socket, RigAt::Host] {

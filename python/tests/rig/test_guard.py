@@ -136,7 +136,7 @@ def test_a_guard_that_is_killed_takes_its_programs_along(tmp_path):
     shutil.rmtree(private)
 
 
-def test_a_guard_whose_kernel_has_no_pidfd_open_is_told_by_its_socket(tmp_path):
+def test_a_guard_whose_kernel_has_no_pidfd_open_learns_the_end_from_its_socket(tmp_path):
     ours, theirs = socket.socketpair()
     code = f"import os, runpy; del os.pidfd_open; runpy.run_path({str(programs.PACKAGE / 'guard.py')!r}, run_name='__main__')"
     words = [sys.executable, "-I", "-S", "-c", code, str(theirs.fileno()), str(os.getpid()), str(tmp_path / "private")]

@@ -35,7 +35,7 @@ fn preemption(files: &[(&str, &str)]) -> (String, String) {
 }
 
 #[test]
-fn the_preemption_model_is_told_by_the_first_file_that_knows_it() {
+fn the_preemption_model_is_read_from_the_first_file_that_has_it() {
     let debug = ("sys/kernel/debug/sched/preempt", "none voluntary (full) lazy\n");
     let command_line = ("proc/cmdline", "quiet preempt=voluntary ro");
     let config = ("boot/config-6.1.0", "# CONFIG_PREEMPT_NONE is not set\nCONFIG_PREEMPT_VOLUNTARY=y\n");

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_log_is_told_by_line_and_column_and_ends_it() {
+    fn a_malformed_line_is_reported_by_line_and_column_and_ends_the_log() {
         let (read, _, error) = stamps(b"(0.000001) a 1FF#\n(0.000002) a 1FF#1\n(0.000003) a 1FF#\n");
         assert_eq!(read.len(), 1);
         assert!(error.is_some_and(|text| text.starts_with("2:18: a byte has two digits")));
@@ -169,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_gives_up_is_told() {
+    fn a_read_error_is_reported() {
         struct FailingReader;
         impl Read for FailingReader {
             fn read(&mut self, _: &mut [u8]) -> io::Result<usize> {

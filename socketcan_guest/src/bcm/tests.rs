@@ -143,7 +143,7 @@ fn a_watch_tells_of_changes_under_its_mask_alone() {
 }
 
 #[test]
-fn silence_is_told_once_and_the_clock_starts_again_with_the_next_frame() {
+fn silence_is_reported_once_and_the_clock_starts_again_with_the_next_frame() {
     let mut bench = Bench::new();
     let watch = Command::new(opcode::RX_SETUP, START, 0x123, &[]).times(0, 10 * MS, Duration::ZERO);
     bench.command(&watch).unwrap();
@@ -159,7 +159,7 @@ fn silence_is_told_once_and_the_clock_starts_again_with_the_next_frame() {
 }
 
 #[test]
-fn changes_are_told_no_faster_than_the_second_interval_and_the_last_one_is_not_lost() {
+fn changes_are_reported_no_faster_than_the_second_interval_and_the_last_one_is_not_lost() {
     let mut bench = Bench::new();
     let watch = Command::new(opcode::RX_SETUP, START, 0x123, &[frame(0x123, &[0xFF])]).times(
         0,

@@ -194,7 +194,7 @@ fn half_duplex_hears_no_message_while_it_sends_and_no_flow_control_while_it_rece
 }
 
 #[test]
-fn identifiers_of_29_bits_are_told_from_those_of_11() {
+fn identifiers_of_29_bits_are_distinguished_from_those_of_11() {
     let (low, high) = (0x18DA_F110 | EXTENDED_FLAG, 0x18DA_10F1 | EXTENDED_FLAG);
     let one = Identifiers { sent: low, received: high };
     let (mut one, mut other) =

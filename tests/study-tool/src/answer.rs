@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn without_the_effect_it_is_told_what_is_outside() {
+    fn without_its_effect_a_case_is_judged_by_name_and_balance() {
         let answer = of_case(&scored_without("humble").cases[0]);
         assert_eq!((&answer["no_wrong_name"], &answer["balance_right"]), (&json!(true), &json!(true)));
         assert!(answer.get("right").is_none());

@@ -193,7 +193,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_study_that_is_told_to_stop_kills_its_program() {
+    fn an_interrupted_study_kills_its_program() {
         assert_eq!(run("sleep 1000", PATIENCE, true), Err(Interrupted));
     }
 

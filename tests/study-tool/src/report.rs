@@ -207,7 +207,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_measured_next_is_read_where_it_is_told() {
+    fn the_next_experiment_is_read_where_it_is_reported() {
         let with = |next: &str| {
             parse(format!(r#"{{"verdict": "nothing-missing", "next": {next}}}"#).as_bytes()).unwrap().next
         };

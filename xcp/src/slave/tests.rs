@@ -200,7 +200,7 @@ fn checksums_are_those_of_ieee() {
 }
 
 #[test]
-fn a_set_is_stored_once_at_a_time_and_told() {
+fn a_set_is_stored_once_at_a_time_and_reported() {
     let mut bench = SlaveBench::connected();
     bench.refused(&[0xF9, 1, 0, 0], Refusal::AccessLocked);
     let mut bench = SlaveBench::unlocked();

@@ -119,7 +119,7 @@ fn nothing_jumps_when_a_load_of_the_axis_ends() {
 }
 
 #[test]
-fn a_bad_force_is_told_with_line_key_value_and_range() {
+fn a_bad_force_is_refused_with_line_key_value_and_range() {
     for (law, hints) in [
         ("'step'; to_n = 501; duration_s = 1", ["e.toml:8: load.set-point[1].to_n = 501 N", "0 to 500 N"]),
         (

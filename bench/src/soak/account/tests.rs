@@ -118,7 +118,7 @@ fn on_a_kernels_bus_the_overflow_count_must_be_what_is_missing_in_all() {
 }
 
 #[test]
-fn what_nobody_sent_is_told() {
+fn what_nobody_sent_is_reported() {
     let account = broken(|participants, _| participants[0].received.add("7", 1));
     assert_eq!(account.broken, ["emulator received 7, which nobody has sent"]);
 }

@@ -164,7 +164,7 @@ fn a_dump_holds_the_rows_and_the_frames_both_ways_and_how_long_the_oldest_sensor
 }
 
 #[test]
-fn a_dump_that_fails_is_told_though_the_next_one_is_good() {
+fn a_dump_that_fails_is_reported_though_the_next_one_is_good() {
     let mut bench = Bench::new(false);
     let in_its_place = bench.run.path().join("flight/controller-0000000007-fault");
     fs::create_dir_all(in_its_place.parent().unwrap()).unwrap();

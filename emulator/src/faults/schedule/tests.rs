@@ -65,7 +65,7 @@ fn faults_begin_and_end_by_time_and_the_plant_is_whole_again() {
 }
 
 #[test]
-fn a_condition_begins_it_once_and_one_that_never_holds_is_told() {
+fn a_condition_begins_a_fault_once_and_one_that_never_holds_is_reported() {
     let mut bench = Bench::new(
         "[[fault]]\nname = \"valve-dead\"\nat = \"drive\"\nwhen = \"drive.position_m\"\nabove = 0.26\nfor_s = 0.05\n\
          [[fault]]\nname = \"valve-dead\"\nat = \"load\"\nwhen = \"drive.position_m\"\nbelow = 0.1\nto_s = 0.2\n",
@@ -98,7 +98,7 @@ fn an_end_stop_is_hit_and_rods_part_once() {
 }
 
 #[test]
-fn people_break_and_mend_and_are_told_when_they_cannot() {
+fn people_break_and_mend_and_are_refused_when_they_cannot() {
     let mut bench = Bench::new("", true);
     let stuck = Fault::new("valve-stuck", Some("drive"), &[]).unwrap();
     let lost = Fault::new("bus-loss", None, &[]).unwrap();

@@ -62,7 +62,7 @@ fn loss_follows_probability_and_seed() {
 }
 
 #[test]
-fn a_fault_concerns_its_own_frames_and_ends_when_told() {
+fn a_fault_concerns_its_own_frames_and_ends_on_order() {
     let mut wire = with(WireFault::Loss { probability: 1.0 }, Frames::Id(0x121));
     assert_eq!(counters(&out(&mut wire, 3)), [0, 1, 2]);
     let mut wire = with(WireFault::Loss { probability: 1.0 }, Frames::Id(0x120));

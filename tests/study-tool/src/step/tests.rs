@@ -154,7 +154,7 @@ fn a_column_that_could_tell_is_refused() {
 }
 
 #[test]
-fn a_record_that_cannot_be_made_is_told_and_leaves_nothing() {
+fn a_record_that_cannot_be_made_is_reported_and_leaves_nothing() {
     let mut fixture = StudyFixture::new("exit 0");
     fixture.tripped = Some(fixture.study.draws[0].recipe.seed);
     let error = fixture.run(|_, _| {}).unwrap_err().to_string();

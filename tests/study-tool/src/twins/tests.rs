@@ -20,7 +20,7 @@ fn with(effect: &str, key: &str, number: f64) -> RigParameters {
 }
 
 #[test]
-fn a_rig_is_told_from_itself_by_chance_and_from_a_very_different_one_always() {
+fn a_rig_is_distinguished_from_itself_by_chance_and_from_a_very_different_one_always() {
     let one = with("piston-leakage", "leakage_nl_per_min", 5.0);
     let same = in_experiment(entry(), [&one, &one], Axis::Drive).unwrap();
     assert_eq!((same, probability(same)), (0.0, 0.5));
