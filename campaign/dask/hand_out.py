@@ -80,7 +80,7 @@ def main():
     else:
         cluster = LocalCluster(n_workers=asked.workers, threads_per_worker=1, dashboard_address=None)
         client = Client(cluster)
-    began, told = time.monotonic(), 0.0
+    began, printed_s = time.monotonic(), 0.0
     try:
         command = [asked.campaign, "run", file, *shipped]
         tasks = {client.submit(do_part, command, part, parts, pure=False): part for part in missing}
@@ -88,8 +88,8 @@ def main():
             write_whole(path(tasks[task]), task.result())
             task.release()
             passed = time.monotonic() - began
-            if done == 1 or passed - told > 2.0 or done == len(missing):
-                told = passed
+            if done == 1 or passed - printed_s > 2.0 or done == len(missing):
+                printed_s = passed
                 left = passed / done * (len(missing) - done)
                 print(f"campaign: {done}/{len(missing)} parts, {left:.0f} s left", file=sys.stderr, flush=True)
     except (RuntimeError, KilledWorker) as error:

@@ -169,11 +169,11 @@ mod tests {
 
     #[test]
     fn the_program_is_given_its_run_and_its_last_line_counts() {
-        let script = "read line; echo hello; echo \"{\\\"told\\\": \\\"$(echo $line | tr -d '\\\"')\\\", \\\"n\\\": 2}\"";
+        let script = "read line; echo hello; echo \"{\\\"line\\\": \\\"$(echo $line | tr -d '\\\"')\\\", \\\"n\\\": 2}\"";
         let outcome = answer(script, 60.0);
         assert_eq!(outcome.ended, EndState::Done, "{outcome:?}");
         assert_eq!(outcome.figures["n"], Value::Number(2.0));
-        let Value::Text(reported) = &outcome.figures["told"] else { panic!("a text") };
+        let Value::Text(reported) = &outcome.figures["line"] else { panic!("a text") };
         assert_eq!(reported, "{again:false,draw:1,run:3,seed:7,values:{hidden:x}}");
     }
 
@@ -191,7 +191,7 @@ mod tests {
     #[test]
     fn a_program_that_takes_too_long_is_asked_to_end_with_all_that_it_started() {
         let folder = tempfile::tempdir().unwrap();
-        let reported = folder.path().join("told");
+        let reported = folder.path().join("reported");
         let script = format!("trap 'echo asked >{}; exit' TERM; sleep 60 & wait", reported.display());
         assert_eq!(answer(&script, 0.3).ended, EndState::Failed);
         assert_eq!(std::fs::read_to_string(reported).unwrap(), "asked\n");

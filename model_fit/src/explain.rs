@@ -44,9 +44,9 @@ pub fn explained(file: &Path, train: &[PathBuf]) -> Result<Explanation, ModelErr
     if !notes.is_empty() {
         let _ = write!(text, "\nnotes\n  {}\n", notes.join("\n  "));
     }
-    let told = structure_in_words(&structure(&baseline, &baseline), weak);
-    let _ = write!(text, "\nwhat these records can tell apart\n  {}\n", told.join("\n  "));
-    let page = page(&model, &told, &text);
+    let identifiability = structure_in_words(&structure(&baseline, &baseline), weak);
+    let _ = write!(text, "\nwhat these records can tell apart\n  {}\n", identifiability.join("\n  "));
+    let page = page(&model, &identifiability, &text);
     Ok(Explanation { text, page })
 }
 

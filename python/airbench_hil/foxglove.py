@@ -130,14 +130,14 @@ def _description(url: str) -> dict[str, Any]:
 
 def follow(bridge: Bridge, url: str, over: threading.Event, say: Callable[[str], None]) -> None:
     """Reads the page until `over`; waits for one that is not there yet, or is gone."""
-    connected, told = False, False
+    connected, reported = False, False
     while not over.is_set():
         try:
             bridge.describe(_description(url))
             for event, data in events(url):
                 if not connected:
                     say(f"connected to {url}")
-                connected, told = True, False
+                connected, reported = True, False
                 if event == "status":
                     bridge.describe(_description(url))  # after `connected` it may be another run's
                 else:
@@ -145,9 +145,9 @@ def follow(bridge: Bridge, url: str, over: threading.Event, say: Callable[[str],
                 if over.is_set():
                     return
         except (OSError, urllib.error.URLError, json.JSONDecodeError) as gone:
-            if not told:
+            if not reported:
                 say(f"{url} is not there ({gone}): waiting for bench watch")
-            told = True
+            reported = True
         connected = False
         over.wait(_AGAIN_S)
 

@@ -256,8 +256,8 @@ def main():
     sent, frames, values, skipped_by_tick = compare_sensors(database, recorded, rows)
     check(len(rows) == summary["cycles"], f"{len(rows)} rows, {summary['cycles']} cycles")
     skipped = set(range(len(rows))) - sent
-    told = (len(skipped), skipped_by_tick)
-    check(told == (summary["skipped"],) * 2, f"skipped: rows without frames and ticks say {told}, summary {summary['skipped']}")
+    counted = (len(skipped), skipped_by_tick)
+    check(counted == (summary["skipped"],) * 2, f"skipped: rows without frames and ticks say {counted}, summary {summary['skipped']}")
     in_events = sum(event["kind"]["skipped"]["cycles"] for event in summary["events"] if "skipped" in event["kind"])
     # Only the first thousand events are kept.
     all_kept = len(summary["events"]) == summary["event_count"]

@@ -17,9 +17,9 @@ def main():
     described = read_model_description(path)
     references = {variable.name: variable.valueReference for variable in described.modelVariables}
     folder = extract(path)
-    told = []
+    log = []
     callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(lambda _environment, _name, status, category, message: told.append(message.decode()))
+    callbacks.logger = fmi2CallbackLoggerTYPE(lambda _environment, _name, status, category, message: log.append(message.decode()))
     callbacks.componentEnvironment = None
     identifier = described.coSimulation.modelIdentifier
 
@@ -41,12 +41,12 @@ def main():
         return fmu.getReal([references[name] for name in names])
 
     def refused(call):
-        before = len(told)
+        before = len(log)
         try:
             call()
         except (FMICallException, Exception) as error:
-            return {"error": str(error), "told": told[before:]}
-        return {"error": None, "told": told[before:]}
+            return {"error": str(error), "log": log[before:]}
+        return {"error": None, "log": log[before:]}
 
     fmu = instance()
     start(fmu)

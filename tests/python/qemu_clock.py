@@ -58,13 +58,13 @@ def line(points):
 
 
 def main():
-    told = list(answers(sys.argv[1]))
-    began = told[0][0]
-    told = [(stamp - began, counts) for stamp, counts in told if stamp - began > STARTING_S]
+    every = list(answers(sys.argv[1]))
+    began = every[0][0]
+    settled = [(stamp - began, counts) for stamp, counts in every if stamp - began > STARTING_S]
     asked = sum(stamp - began > STARTING_S for stamp in ticks(sys.argv[1]))
-    report = {"ticks": asked, "answers": len(told), "seconds": round(told[-1][0] - told[0][0], 3)}
+    report = {"ticks": asked, "answers": len(settled), "seconds": round(settled[-1][0] - settled[0][0], 3)}
     for name, nominal in NOMINAL.items():
-        slope, offsets = line([(stamp, counts[name]) for stamp, counts in told])
+        slope, offsets = line([(stamp, counts[name]) for stamp, counts in settled])
         offsets_us = sorted(abs(offset) / nominal * 1e6 for offset in offsets)
         report[name] = {
             "counts_per_s": round(slope, 3),

@@ -15,8 +15,8 @@ while (interval := reader.get_next_interval_histogram()) is not None:
     if tag not in sums:
         sums[tag] = HdrHistogram(1, BOUND_NS, 3)
     sums[tag].add(interval)
-told = {
+figures = {
     tag: {"count": all_of_it.get_total_count(), "max": all_of_it.get_max_value()}
     for tag, all_of_it in sums.items()
 }
-json.dump(told, sys.stdout, indent=1)
+json.dump(figures, sys.stdout, indent=1)

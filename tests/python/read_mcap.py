@@ -21,10 +21,10 @@ def main():
         channels, in_file = {}, []
         for schema, channel, message in reader.iter_messages(log_time_order=False):
             assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json"), channel.topic
-            told = channels.setdefault(channel.topic, {"schema": json.loads(schema.data), "times_ns": [], "messages": []})
-            assert message.sequence == len(told["messages"]), f"{channel.topic}: a hole before {message.sequence}"
-            told["times_ns"].append(message.log_time)
-            told["messages"].append(json.loads(message.data))
+            contents = channels.setdefault(channel.topic, {"schema": json.loads(schema.data), "times_ns": [], "messages": []})
+            assert message.sequence == len(contents["messages"]), f"{channel.topic}: a hole before {message.sequence}"
+            contents["times_ns"].append(message.log_time)
+            contents["messages"].append(json.loads(message.data))
             in_file.append(message.log_time)
     assert counted == len(in_file) < records
     # At once, by the encoder in C: json.dump has one in Python.

@@ -28,7 +28,7 @@ def main():
     table = numpy.loadtxt(inputs, delimiter=",", skiprows=1, ndmin=2)
     signals = numpy.array([tuple(row) for row in table], dtype=kinds)
     wanted = [variable.name for variable in described.modelVariables if variable.causality == "output"]
-    told = []
+    log = []
     # FMPy says there which inputs have no column.
     with contextlib.redirect_stdout(sys.stderr):
         result = simulate_fmu(
@@ -40,10 +40,10 @@ def main():
             input=signals,
             output=wanted,
             validate=True,
-            logger=lambda *arguments: told.append(str(arguments[-1])),
+            logger=lambda *arguments: log.append(str(arguments[-1])),
         )
     numpy.savetxt(outputs, numpy.array(result.tolist()), delimiter=",", fmt="%.17g", comments="", header=",".join(result.dtype.names))
-    print("\n".join(told))
+    print("\n".join(log))
 
 
 if __name__ == "__main__":

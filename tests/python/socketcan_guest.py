@@ -22,7 +22,7 @@ def check(what, holds):
     print(what)
 
 
-def told(got):
+def text_of(got):
     """All of a message but its time."""
     if got is None:
         return "nothing"
@@ -45,24 +45,24 @@ def send_and_receive(channel):
         print(one.channel_info, one.protocol.name, one.state.name)
         one.send(message(0x123, 1, 2, 3))
         got = other.recv(PATIENCE_S)
-        print("a frame arrives:", told(got))
+        print("a frame arrives:", text_of(got))
         check("it has a time stamp of now", abs(got.timestamp - time.time()) < 60)
         check("it is of this machine", not got.is_rx)
         check("the sender does not hear itself", one.recv(0.05) is None)
         one.send(message(0x12345678, is_extended_id=True, is_remote_frame=True, dlc=4))
-        print("a remote request keeps its length:", told(other.recv(PATIENCE_S)))
+        print("a remote request keeps its length:", text_of(other.recv(PATIENCE_S)))
         one.send(message(0x040, 0, 0, 0, 0, 0, 0, 0, 0, is_error_frame=True))
-        print("an error frame:", told(other.recv(PATIENCE_S)))
-        print("none without waiting:", told(other.recv(0)))
+        print("an error frame:", text_of(other.recv(PATIENCE_S)))
+        print("none without waiting:", text_of(other.recv(0)))
     with open_bus(channel, receive_own_messages=True) as own:
         own.send(message(0x124))
-        print("own messages on request:", told(own.recv(PATIENCE_S)))
+        print("own messages on request:", text_of(own.recv(PATIENCE_S)))
     with open_bus(channel, local_loopback=False) as mute, open_bus(channel) as other:
         mute.send(message(0x124))
-        print("without loopback:", told(other.recv(0.1)))
+        print("without loopback:", text_of(other.recv(0.1)))
     with open_bus(channel, ignore_rx_error_frames=True) as deaf, open_bus(channel) as one:
         one.send(message(0x040, 0, 0, 0, 0, 0, 0, 0, 0, is_error_frame=True))
-        print("error frames left out:", told(deaf.recv(0.1)))
+        print("error frames left out:", text_of(deaf.recv(0.1)))
 
 
 def filters(channel):
@@ -70,41 +70,41 @@ def filters(channel):
         other.set_filters([{"can_id": 0x200, "can_mask": 0x7F0, "extended": False}])
         for identifier in (0x123, 0x201, 0x300, 0x20F):
             one.send(message(identifier))
-        print("filters:", [told(other.recv(PATIENCE_S)) for _ in range(2)], told(other.recv(0.05)))
+        print("filters:", [text_of(other.recv(PATIENCE_S)) for _ in range(2)], text_of(other.recv(0.05)))
         other.set_filters([{"can_id": 0x1F0, "can_mask": 0x1FFFFFF0, "extended": True}, {"can_id": 0x300, "can_mask": 0x7FF}])
         for identifier, extended in ((0x1F2, False), (0x1F3, True), (0x300, False), (0x201, True)):
             one.send(message(identifier, is_extended_id=extended))
-        print("two filters:", [told(other.recv(PATIENCE_S)) for _ in range(2)], told(other.recv(0.05)))
+        print("two filters:", [text_of(other.recv(PATIENCE_S)) for _ in range(2)], text_of(other.recv(0.05)))
         other.set_filters(None)
         one.send(message(0x123))
-        print("filters taken away:", told(other.recv(PATIENCE_S)))
+        print("filters taken away:", text_of(other.recv(PATIENCE_S)))
 
 
 def any_channel(channel):
     with open_bus("") as everywhere, open_bus(channel) as one:
         one.send(message(0x125, 7))
         got = everywhere.recv(PATIENCE_S)
-        print("a socket of any interface names it:", told(got))
+        print("a socket of any interface names it:", text_of(got))
         everywhere.send(message(0x126, channel=channel))
-        print("and sends where it is told:", told(one.recv(PATIENCE_S)))
+        print("and sends where it is told:", text_of(one.recv(PATIENCE_S)))
 
 
 def periodic(channel):
     with open_bus(channel) as one, open_bus(channel) as other:
         task = one.send_periodic(message(0x210, 1), 0.01)
-        print("a periodic task of the broadcast manager:", type(task).__name__, told(other.recv(PATIENCE_S)))
+        print("a periodic task of the broadcast manager:", type(task).__name__, text_of(other.recv(PATIENCE_S)))
         stamps = [other.recv(PATIENCE_S).timestamp for _ in range(10)]
         check("its frames follow each other", stamps == sorted(stamps) and stamps[-1] > stamps[0])
         task.modify_data(message(0x210, 2))
         while (got := other.recv(PATIENCE_S)).data[0] != 2:
             pass
-        print("its data change:", told(got))
+        print("its data change:", text_of(got))
         task.stop()
         while other.recv(0.3) is not None:
             pass
         print("it stops")
         task.start()
-        print("it starts again:", told(other.recv(PATIENCE_S)))
+        print("it starts again:", text_of(other.recv(PATIENCE_S)))
         task.stop()
         limited = one.send_periodic(message(0x211, 1), 0.01, duration=0.05)
         while other.recv(PATIENCE_S).arbitration_id != 0x211:
@@ -142,7 +142,7 @@ async def hear_asynchronously(channel):
         listening = can.Notifier(other, [reader], loop=asyncio.get_running_loop())
         for number in range(3):
             one.send(message(0x500 + number))
-        print("a notifier in an event loop:", [told(await asyncio.wait_for(reader.get_message(), PATIENCE_S)) for _ in range(3)])
+        print("a notifier in an event loop:", [text_of(await asyncio.wait_for(reader.get_message(), PATIENCE_S)) for _ in range(3)])
         listening.stop()
 
 

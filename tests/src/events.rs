@@ -53,7 +53,7 @@ pub fn spans(events: &[Event], from: &str, to: &str, rows: usize) -> Vec<Range<u
 pub fn expect_valve_shut_between(summary: &Value, measurement: &Table, from: &str, to: &str) {
     let valve = measurement.column("drive_valve");
     let spans = spans(&all(summary), from, to, valve.len());
-    assert!(!spans.is_empty(), "no {from} was told: {:#}", summary["events"]);
+    assert!(!spans.is_empty(), "no {from} was reported: {:#}", summary["events"]);
     for span in &spans {
         let open = span.clone().find(|row| valve[*row] != 0.0);
         assert_eq!(open, None, "the valve is open in a row of {span:?}, from {from} to {to}");

@@ -18,7 +18,7 @@ pub fn expected() -> PathBuf {
 }
 
 /// Lines of the recorded answers that differ, in their order, each with the answer here. These calls are native, so that nobody
-/// looks at them before they succeed; each is told on standard error. docs/socketcan-without-kernel.md has them too.
+/// looks at them before they succeed; each is reported on standard error. docs/socketcan-without-kernel.md has them too.
 pub const DIFFERENCES: [(&str, &str); 3] = [
     ("write 8: -1 EINVAL", "write 8: 8"),
     ("write 9 bytes of data: -1 EINVAL", "write 9 bytes of data: 16"),

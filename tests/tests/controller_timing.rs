@@ -148,7 +148,7 @@ fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() 
     let reported: Vec<_> = (0..rows.len()).filter(|row| rows[*row].vitals.continued > 0).collect();
     assert!(
         matches!(reported[..], [row] if row + 1 >= stopped),
-        "told in {reported:?}, stopped at {stopped}"
+        "reported in {reported:?}, stopped at {stopped}"
     );
     assert_eq!(rows[reported[0]].vitals.continued, 1, "{:?}", rows[reported[0]]);
     let report = scene.report();

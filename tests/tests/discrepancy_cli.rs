@@ -374,7 +374,7 @@ fn what_cannot_be_read_is_refused_with_file_and_line() {
     on("close", train, &path("out"), &["--test", nowhere])
         .expect_code(BAD_INPUT)
         .expect_stderr(&["nowhere.csv"]);
-    assert!(began.elapsed().as_secs_f64() < 2.0, "a missing --test is told after {:?}", began.elapsed());
+    assert!(began.elapsed().as_secs_f64() < 2.0, "a missing --test is reported after {:?}", began.elapsed());
     on("close", train, &path("out"), &["--without", "no-such-effect"])
         .expect_code(BAD_INPUT)
         .expect_stderr(&["no-such-effect", "inclination"]);

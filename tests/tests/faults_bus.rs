@@ -145,10 +145,10 @@ fn a_rig_that_was_killed_is_missed_while_others_still_talk() {
     scene.wait_for_rows("emulator", UNDER_WAY);
     emulator.kill();
     let over = Arc::new(AtomicBool::new(false));
-    let told_over = Arc::clone(&over);
+    let is_over = Arc::clone(&over);
     let chatter = std::thread::spawn(move || {
         let frame = CanFrame::new(0x7F0, &[1]).to_bytes();
-        while !told_over.load(Ordering::Relaxed) {
+        while !is_over.load(Ordering::Relaxed) {
             stranger.send(&frame);
             std::thread::sleep(Duration::from_millis(100));
         }

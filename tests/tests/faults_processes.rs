@@ -59,7 +59,7 @@ fn an_emulator_that_is_killed_and_restarted_is_found_again_and_the_chain_starts_
     let report = scene.report();
     assert!(count(&report, "/bus/disconnects") >= 1 && count(&report, "/bus/reconnects") >= 1);
     let news = report["news"].as_array().expect("news");
-    let anew = news.iter().position(|item| item == "rig-restarted").expect("the restart is told");
+    let anew = news.iter().position(|item| item == "rig-restarted").expect("the restart is reported");
     let states = |axis: &str| -> Vec<&str> {
         let of_axis = news[anew..].iter().map(|item| &item["state"]).filter(|state| state["axis"] == axis);
         of_axis.filter_map(|state| state["state"].as_str()).collect()
@@ -133,5 +133,5 @@ fn an_emulator_that_stands_still_catches_up_and_counts_skipped_cycles_never_lost
         .filter(|event| event.kind == "skipped")
         .map(|event| count(&event.of, "/cycles"))
         .sum();
-    assert_eq!(reported, skipped, "every skipped cycle was told");
+    assert_eq!(reported, skipped, "every skipped cycle was reported");
 }

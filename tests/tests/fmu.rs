@@ -149,7 +149,7 @@ fn states_and_resets_repeat_to_the_bit_and_refusals_reach_the_importers_log() {
         ("other_guid", "put together from two builds"),
     ] {
         assert!(!reported[what]["error"].is_null(), "{what} was taken");
-        let said = reported[what]["told"].to_string();
+        let said = reported[what]["log"].to_string();
         assert!(said.contains(words), "{what}: {said}");
     }
 }

@@ -212,17 +212,18 @@ fn an_mcap_holds_each_frame_as_it_was_and_its_signals() {
         let ns = time.as_u64().expect("a time");
         let stamp = format!("({:010}.{:06})", ns / 1_000_000_000, ns % 1_000_000_000 / 1000);
         let (interface, frame) = (&message["interface"], &message["frame"]);
-        let told = [interface, frame].map(|text| text.as_str().expect("a text"));
-        assert_eq!(line, [&stamp, told[0], told[1]].join(" "));
-        let id = u64::from_str_radix(told[1].split('#').next().expect("a number"), 16).expect("hexadecimal");
+        let texts = [interface, frame].map(|text| text.as_str().expect("a text"));
+        assert_eq!(line, [&stamp, texts[0], texts[1]].join(" "));
+        let id = u64::from_str_radix(texts[1].split('#').next().expect("a number"), 16).expect("hexadecimal");
         assert_eq!(message["id"].as_u64(), Some(id));
     }
     for (name, column) in columns(&csv).iter().filter(|(name, _)| *name != "time_s") {
         let (message, signal) = name.split_once('.').expect("a frame and a signal");
         let channel = &read["channels"][format!("/can/{message}")];
-        let told: Vec<_> = list(channel, "messages").iter().map(|message| message[signal].as_f64()).collect();
+        let exported: Vec<_> =
+            list(channel, "messages").iter().map(|message| message[signal].as_f64()).collect();
         let expected: Vec<_> = column.iter().filter(|value| value.is_some()).copied().collect();
-        assert!(told == expected, "{name}");
+        assert!(exported == expected, "{name}");
     }
 }
 
@@ -235,10 +236,10 @@ fn an_mcap_of_a_log_alone_has_no_tables_and_says_which_frames_are_no_signals() {
     let read = mcap_channels(&out);
     let topics: Vec<_> = read["channels"].as_object().expect("channels").keys().collect();
     assert_eq!(topics, ["/can", "/can/DriveSensors"]);
-    let told: Vec<_> =
+    let exported: Vec<_> =
         list(&read["channels"]["/can"], "messages").iter().map(|message| message["frame"].as_str()).collect();
     let expected: Vec<_> = FOREIGN.lines().map(|line| line.split(' ').nth(2)).collect();
-    assert_eq!(told, expected);
+    assert_eq!(exported, expected);
 }
 
 #[test]

@@ -128,20 +128,20 @@ fn sockets_report_that_the_bus_went_down_and_go_on_when_it_is_back_as_on_vcan() 
 fn a_listener_ends_with_network_is_down_as_on_vcan() {
     let scene = Scene::new(SHORT);
     let host = scene.bus_host("");
-    let mut told = start(&scene, "", &[&"candump", &"vcan0"]);
+    let mut listener = start(&scene, "", &[&"candump", &"vcan0"]);
     scene.wait_for_peers(1);
     let peer = scene.peer();
     let mut tries = 0;
     // Until candump has bound its socket nothing reaches it.
-    while !told.stdout().contains("7E0") {
+    while !listener.stdout().contains("7E0") {
         tries += 1;
-        assert!(tries < 3000, "candump shows nothing: {}", told.stderr());
+        assert!(tries < 3000, "candump shows nothing: {}", listener.stderr());
         peer.send(&protocol::can::CanFrame::new(0x7E0, &[]).to_bytes());
         std::thread::sleep(std::time::Duration::from_millis(10));
     }
     host.interrupt();
-    told.wait_for("Network is down");
-    let ended = told.wait();
+    listener.wait_for("Network is down");
+    let ended = listener.wait();
     let recorded = fs::read_to_string(expected().join("can-utils/down")).unwrap();
     assert!(recorded.starts_with("read: Network is down\ncandump 1\n"), "{recorded}");
     ended.expect_code(1).expect_stderr(&["read: Network is down", "vcan0 is down"]);

@@ -48,7 +48,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     controller.interrupt();
     emulator.interrupt();
     let summary = scene.summary();
-    // What the flood cost is told as a loss at a peer's queue, if it cost anything; the rig's own commands were never disputed.
+    // What the flood cost is reported as a loss at a peer's queue, if it cost anything; the rig's own commands were never disputed.
     assert_eq!(count(&summary, "/drive_commands/two_sources"), 0);
     assert_eq!(count(&summary, "/frames_malformed"), 0);
 }
@@ -63,12 +63,15 @@ fn a_flood_through_it_arrives_whole_and_in_order() {
     start(&scene, "", &[&flow, &"send", &"vcan0", &"20000", &"4000"]).wait().expect_code(0);
     let received = pair.wait().expect_code(0);
     received.expect_stdout(&["out of order 0"]);
-    let told = |what: &str| -> u64 {
+    let number_after = |what: &str| -> u64 {
         let after = received.stdout.split(what).nth(1).unwrap_or_else(|| panic!("{}", received.stdout));
         after.split(|c: char| !c.is_ascii_digit()).next().unwrap().parse().unwrap()
     };
-    assert_eq!(told("received ") + told("lost at its queue ") + told("missing elsewhere "), 20_000);
-    assert_eq!(told("missing elsewhere "), 0, "{}", received.stdout);
+    assert_eq!(
+        number_after("received ") + number_after("lost at its queue ") + number_after("missing elsewhere "),
+        20_000
+    );
+    assert_eq!(number_after("missing elsewhere "), 0, "{}", received.stdout);
 }
 
 const SENDER: &str = include_str!("../python/guests/fills_the_bus.py");
@@ -180,8 +183,9 @@ fn it_ends_soon_after_a_program_that_left_hundreds_of_messages_to_nobody() {
     };
     let accepted = number(&ended.stdout, "accepted ").expect("a number");
     assert!(accepted > 300, "its own queue and more: {accepted}");
-    let told = ended.stderr.lines().find(|line| line.contains("accepted and dropped")).expect("it is told");
-    let dropped = number(told, "bench can: ").expect("a number");
+    let line =
+        ended.stderr.lines().find(|line| line.contains("accepted and dropped")).expect("it is reported");
+    let dropped = number(line, "bench can: ").expect("a number");
     // All but those that were begun, one a second.
     assert!(dropped < accepted && dropped > accepted - 20, "{dropped} of {accepted}");
 }

@@ -50,11 +50,11 @@ fn a_suspect_in_a_file_is_named_over_the_bus_and_runs_in_real_time_in_the_extend
     let records: [&dyn AsRef<OsStr>; 4] = [&"--train", &train, &"--test", &test];
     let close: [&dyn AsRef<OsStr>; 7] =
         [&"close", &"--rig", &rig(), &"--suspects", &suspects, &"--out", &out];
-    let told = discrepancy(&[&close[..], &records].concat()).expect_code(0).stdout;
+    let printed = discrepancy(&[&close[..], &records].concat()).expect_code(0).stdout;
     let report = json(&out.join("report.json"));
     let named = &report["named"][0];
-    assert_eq!(named["effect"], "eddy-brake", "{told}");
-    assert_eq!(report["verification"]["confirmed"], true, "{told}");
+    assert_eq!(named["effect"], "eddy-brake", "{printed}");
+    assert_eq!(report["verification"]["confirmed"], true, "{printed}");
     for (at, value) in [(0, 30.0), (1, 160.0)] {
         let number = &named["parameters"][at];
         let (found, error) = (number["value"].as_f64().unwrap(), number["standard_error"].as_f64().unwrap());

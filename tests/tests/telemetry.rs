@@ -65,7 +65,7 @@ fn a_viewer_receives_what_the_files_hold() {
     assert!(reported.cycles.len() > 3000, "{} cycles", reported.cycles.len());
     assert_eq!(reported.lost, 0);
     let consecutive = reported.cycles.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
-    assert!(consecutive, "cycles are told in order and without a hole");
+    assert!(consecutive, "cycles are sent in order and without a hole");
 
     let summary = json(&out.join("summary.json"));
     let without_text =

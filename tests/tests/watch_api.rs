@@ -142,8 +142,8 @@ fn expect_dashboard_of(page: &LivePage) {
     let judge = |metrics: &str| -> Value {
         let script = workspace().join("tests/python/dashboard_metrics.py");
         let dashboard = workspace().join("docs/examples/grafana/airbench.json");
-        let told = python_reads(&[script.as_os_str(), dashboard.as_os_str()], metrics);
-        serde_json::from_str(&told).expect("JSON")
+        let printed = python_reads(&[script.as_os_str(), dashboard.as_os_str()], metrics);
+        serde_json::from_str(&printed).expect("JSON")
     };
     let judged = judge(&metrics);
     assert!(judged["expressions"].as_u64() > Some(30), "{judged}");
@@ -345,7 +345,10 @@ fn the_page_comes_back_with_the_emulator_and_the_run_goes_on_without_the_page() 
     before.wait().expect_code(130);
     events.wait_for("status", |status| status["telemetry"] == "connected");
     let description = watched.page.get("/api/description").json();
-    assert_eq!(description["experiment"]["title"], "restless again", "it is there when connected is told");
+    assert_eq!(
+        description["experiment"]["title"], "restless again",
+        "it is there when connected is reported"
+    );
     let rows = events.wait_for("rows", |_| true);
     assert!(rows["t_s"][0].as_f64() < Some(5.0), "time begins anew: {rows}");
 

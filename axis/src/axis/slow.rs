@@ -47,7 +47,7 @@ impl StatusSchedule {
 }
 
 impl AxisController {
-    /// States of the chains as the partner and the rig are told.
+    /// States of the chains as they are sent to the partner and the rig.
     pub(crate) fn status(&self) -> ChainStatus {
         let (main_chain, ok, repetition) =
             self.supervisory.output.map_or((MainChainState::WaitingForRig, false, 0), |output| {

@@ -18,9 +18,10 @@ const REFRESH_NS: u64 = 1_000_000;
 /// Whether another thread had the CPU for most of `length_ns`, or the process was stopped: the spinning thread never yields by
 /// itself.
 fn was_preempted(counted: &VitalCounts, length_ns: u64) -> bool {
-    let untold = counted.run_delay_ns == 0;
+    let run_delay_is_unavailable = counted.run_delay_ns == 0;
     counted.voluntary_switches > 0
-        || (counted.involuntary_switches > 0 && (untold || counted.run_delay_ns >= length_ns / 2))
+        || (counted.involuntary_switches > 0
+            && (run_delay_is_unavailable || counted.run_delay_ns >= length_ns / 2))
 }
 
 /// Finds gaps in the readings of the clock on one CPU.
@@ -88,7 +89,7 @@ mod tests {
             gap,
             Gap { cpu: 3, from_ns: 1_000 + GAP_NS, to_ns: 1_001 + 2 * GAP_NS, another_ran: false }
         );
-        assert_eq!(watch.look(gap.to_ns + 50, VitalCounts::default), None, "a gap is told once");
+        assert_eq!(watch.look(gap.to_ns + 50, VitalCounts::default), None, "a gap is reported once");
     }
 
     #[test]

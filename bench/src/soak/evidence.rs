@@ -160,12 +160,12 @@ impl SegmentFiles {
         let axes = self.controllers.values().flat_map(|reported| reported.axes.values());
         let drive = self.drive();
         let summary = &self.summary;
-        let is_told = self.reports.get(EMULATOR).is_some_and(|report| report.bus.is_some());
+        let has_bus_counters = self.reports.get(EMULATOR).is_some_and(|report| report.bus.is_some());
         Figures {
             cycles: summary.cycles,
             skipped: summary.skipped,
-            overruns: is_told.then_some(summary.overruns),
-            stale_commands: is_told.then_some(summary.stale_commands),
+            overruns: has_bus_counters.then_some(summary.overruns),
+            stale_commands: has_bus_counters.then_some(summary.stale_commands),
             frames_sent: self.reports.values().filter_map(|report| report.bus).map(|bus| bus.sent).sum(),
             position_error_dynamic_m: drive.and_then(|drive| drive.position_error_dynamic_m),
             position_error_static_m: drive.and_then(|drive| drive.position_error_static_m),

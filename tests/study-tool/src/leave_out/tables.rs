@@ -75,7 +75,7 @@ pub(crate) fn headline(cases: &[Case]) -> Vec<Line> {
         || cases.iter().filter(|case| case.left_out.as_ref().is_some_and(|left| !left.with_memory));
     let worst = || no_memory().filter_map(|case| case.judgement.claimed_closed_ratio);
     let joint = || no_memory().filter_map(|case| case.judgement.claimed_joint_ratio);
-    let told = |case: &Case| case.judgement.claimed_closed_ratio.is_some();
+    let has_gap = |case: &Case| case.judgement.claimed_closed_ratio.is_some();
     let closed = |ratio: f64| ratio >= STILL_CLOSED;
     let both_right = |left: &LeaveOutJudgement| left.balance_right && left.variable_right;
     let variable = "the same: right variable among the first two";
@@ -85,7 +85,7 @@ pub(crate) fn headline(cases: &[Case]) -> Vec<Line> {
         Line::of(both, "at least 85 %", left(), both_right),
         Line::of("the same: right balance", "no target", left(), |left| left.balance_right),
         Line::of(variable, "no target", left(), |left| left.variable_right),
-        Line::of("effects without memory: a gap told", "all", no_memory(), told),
+        Line::of("effects without memory: a gap told", "all", no_memory(), has_gap),
         Line::of("the same, gap told: all signals together closed by at least 60 %", "all", joint(), closed),
         Line::of("the same, gap told: every signal closed by at least 60 %", "no target", worst(), closed),
         Line::of_errors(cases),
