@@ -111,7 +111,7 @@ fn answering() -> Request {
 }
 
 fn wait_for_the_end(bus: &BusUrl) -> Result<i32, CanError> {
-    let interrupt = Interrupt::watch()?;
+    let interrupt = Interrupt::install()?;
     warn(&format!("hosting {bus}; Ctrl-C ends it"));
     while !interrupt.came() {
         std::thread::sleep(POLL_PERIOD);

@@ -97,7 +97,7 @@ impl ConformanceError {
 /// # Errors
 /// [`ConformanceError`] when the check could not be made; violations of the controller are results.
 pub(crate) fn run(arguments: &ConformanceArguments) -> Result<Exit, ConformanceError> {
-    let interrupt = Interrupt::watch().map_err(ConformanceError::System)?;
+    let interrupt = Interrupt::install().map_err(ConformanceError::System)?;
     let began = Instant::now();
     // Dropping it at the end removes the folder.
     let (url, _folder) = match arguments.bus.clone() {

@@ -91,7 +91,7 @@ struct Report {
 
 /// Listens and serves until SIGINT or SIGTERM.
 pub(crate) fn run(arguments: &GatewayArguments) -> Result<Exit, GatewayError> {
-    let interrupt = Interrupt::watch().map_err(GatewayError::System)?;
+    let interrupt = Interrupt::install().map_err(GatewayError::System)?;
     let mut gateway = Gateway::open(arguments)?;
     gateway.announce(arguments.read_only);
     while !interrupt.came() {

@@ -66,7 +66,8 @@ impl PingPongError {
 /// Measures as asked, prints the figures, and writes them where asked.
 pub(crate) fn run(arguments: &PingPongArguments) -> Result<Exit, PingPongError> {
     let started = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-    let interrupt = Interrupt::watch().map_err(|error| PingPongError::system("no signal handler", error))?;
+    let interrupt =
+        Interrupt::install().map_err(|error| PingPongError::system("no signal handler", error))?;
     // Before this process acquires real-time privileges, which the child would inherit.
     let (mut transport, mut other) = open(arguments)?;
     let played = play(arguments, &mut *transport, &interrupt);

@@ -77,8 +77,8 @@ struct ProbeState {
 
 pub(crate) fn run(arguments: &ProbeArguments) -> Result<Exit, ProbeError> {
     let cpus = cpus(arguments.cpus.as_deref())?;
-    let interrupt = Interrupt::watch().map_err(ProbeError::Signals)?;
-    let continued = Continued::watch().map_err(ProbeError::Signals)?;
+    let interrupt = Interrupt::install().map_err(ProbeError::Signals)?;
+    let continued = Continued::install().map_err(ProbeError::Signals)?;
     let mut file = LineFile::create(&arguments.out).map_err(ProbeError::Write)?;
     write_head(file.lines()).and_then(|()| file.write_out()).map_err(ProbeError::Write)?;
     // A page fault would be a gap caused by the probe.

@@ -94,7 +94,7 @@ pub(crate) fn run(arguments: &ReplayArguments) -> Result<Exit, ReplayError> {
     if let Some(out) = &arguments.out {
         std::fs::create_dir_all(out).map_err(|error| FileError::write(out, error))?;
     }
-    let interrupt = Interrupt::watch().map_err(ReplayError::Signals)?;
+    let interrupt = Interrupt::install().map_err(ReplayError::Signals)?;
     let clock: StampClock = Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns));
     let mut bus = bus::open(&arguments.bus, clock)?;
     if !connected(bus.as_mut(), Duration::from_secs(arguments.wait_s), &interrupt) {

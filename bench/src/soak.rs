@@ -108,7 +108,7 @@ pub(crate) fn run(arguments: &SoakArguments) -> Result<Exit, SoakError> {
     let soaking = SoakRun {
         plan: Plan { experiments: arguments.experiments.clone(), load: load.is_some(), loss },
         context: SegmentContext { arguments, bin_dir, load: load.unwrap_or_default() },
-        interrupt: Interrupt::watch().map_err(SoakError::Signals)?,
+        interrupt: Interrupt::install().map_err(SoakError::Signals)?,
     };
     let (exit, because) = soaking.run(&mut keeping)?;
     keeping.soak.ended_because = Some(because.clone());

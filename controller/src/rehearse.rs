@@ -36,7 +36,7 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
     let mut rehearsal = rehearsal::of_inputs(&inputs, &scene, arguments.seed, arguments.files.repeat)
         .map_err(RunError::input)?;
     let interrupt =
-        Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
+        Interrupt::install().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))?;
     let out = &arguments.files.out;
     std::fs::create_dir_all(out)
         .and_then(|()| clear_results(out))

@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     let tables = Tables::create(out, axes).map_err(RunError::output)?;
     let signals =
-        Signals::watch().map_err(|error| RunError::Input(format!("cannot watch for signals: {error}")))?;
+        Signals::install().map_err(|error| RunError::Input(format!("cannot watch for signals: {error}")))?;
     let mut bus =
         bus::open(&arguments.bus, Box::new(|age_ns| MonotonicClock.now().as_nanos().saturating_sub(age_ns)))?;
 
@@ -180,8 +180,12 @@ struct Signals {
 }
 
 impl Signals {
-    fn watch() -> io::Result<Self> {
-        Ok(Self { interrupt: Interrupt::watch()?, freeze: Freeze::watch()?, continued: Continued::watch()? })
+    fn install() -> io::Result<Self> {
+        Ok(Self {
+            interrupt: Interrupt::install()?,
+            freeze: Freeze::install()?,
+            continued: Continued::install()?,
+        })
     }
 }
 

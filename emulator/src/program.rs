@@ -39,7 +39,7 @@ fn host_bus(arguments: &BusArguments) -> Result<Exit, RunError> {
     let BusUrl::Unix { path, wire } = &arguments.bus else {
         return Err(RunError::Input("only an embedded bus, unix:///PATH, needs a host".into()));
     };
-    let interrupt = run::watch_interrupt()?;
+    let interrupt = run::install_interrupt()?;
     let host = run::start_host(Host::bind(path, *wire, None)?, Some(DEFAULT_FIFO_PRIORITY + 1));
     protocol::say!("emulator: hosting {}; Ctrl-C ends it", arguments.bus);
     let began = Instant::now();

@@ -91,7 +91,7 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
         script.check_host(false)?;
     }
     let periodic = loop_config(arguments)?;
-    let shared = watch_signals()?;
+    let shared = install_signals()?;
 
     // Lockstep uses simulated time, so that the log does not depend on the machine.
     let simulated_ns = Arc::new(AtomicU64::new(0));
@@ -142,17 +142,17 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     })
 }
 
-/// Watches for SIGINT and SIGTERM.
-pub(crate) fn watch_interrupt() -> Result<Interrupt, RunError> {
-    Interrupt::watch().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
+/// Installs the handlers of SIGINT and SIGTERM.
+pub(crate) fn install_interrupt() -> Result<Interrupt, RunError> {
+    Interrupt::install().map_err(|error| RunError::Input(format!("cannot watch for Ctrl-C: {error}")))
 }
 
-fn watch_signals() -> Result<Shared, RunError> {
+fn install_signals() -> Result<Shared, RunError> {
     let refused = |error| RunError::Input(format!("cannot watch for SIGUSR1 and SIGCONT: {error}"));
     Ok(Shared {
-        interrupt: watch_interrupt()?,
-        freeze: Freeze::watch().map_err(refused)?,
-        continued: Continued::watch().map_err(refused)?,
+        interrupt: install_interrupt()?,
+        freeze: Freeze::install().map_err(refused)?,
+        continued: Continued::install().map_err(refused)?,
         ..Shared::default()
     })
 }

@@ -100,7 +100,7 @@ fn push_newest<T>(queue: &mut VecDeque<T>, most: usize, newest: T) {
 /// # Errors
 /// [`LiveError`] when bus, port or system fail.
 pub fn run(arguments: &WatchArguments) -> Result<Exit, LiveError> {
-    let interrupt = Interrupt::watch().map_err(LiveError::System)?;
+    let interrupt = Interrupt::install().map_err(LiveError::System)?;
     let mut server = Server::open(arguments)?;
     server.announce();
     while !interrupt.came() {

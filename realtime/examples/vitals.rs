@@ -10,7 +10,7 @@ const READINGS: u32 = 20_000;
 
 #[allow(clippy::print_stdout)] // the figures are the result
 fn main() -> std::io::Result<()> {
-    let mut vitals = VitalsReader::new(Continued::watch()?);
+    let mut vitals = VitalsReader::new(Continued::install()?);
     let (mut reading, mut clock) = (Recorder::new(), Recorder::new());
     for _ in 0..READINGS {
         let before = MonotonicClock.now();

@@ -20,11 +20,11 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 pub struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
-    /// Starts watching.
+    /// Installs the handlers of SIGINT and SIGTERM.
     ///
     /// # Errors
     /// What the system says when it takes no handler.
-    pub fn watch() -> io::Result<Self> {
+    pub fn install() -> io::Result<Self> {
         let interrupt = Self::default();
         for signal in [SIGINT, SIGTERM] {
             flag::register(signal, Arc::clone(&interrupt.0))?;
@@ -49,11 +49,11 @@ impl Interrupt {
 pub struct Freeze(Arc<AtomicBool>);
 
 impl Freeze {
-    /// Starts watching; from then on SIGUSR1 does not end the process.
+    /// Installs the handler; from then on SIGUSR1 does not end the process.
     ///
     /// # Errors
     /// What the system says when it takes no handler.
-    pub fn watch() -> io::Result<Self> {
+    pub fn install() -> io::Result<Self> {
         let freeze = Self::default();
         flag::register(SIGUSR1, Arc::clone(&freeze.0))?;
         Ok(freeze)
@@ -71,11 +71,11 @@ impl Freeze {
 pub struct Continued(Arc<AtomicU64>);
 
 impl Continued {
-    /// Starts counting.
+    /// Installs the handler and starts counting.
     ///
     /// # Errors
     /// What the system says when it takes no handler.
-    pub fn watch() -> io::Result<Self> {
+    pub fn install() -> io::Result<Self> {
         let continued = Self::default();
         let count = Arc::clone(&continued.0);
         let raise = move || {
@@ -103,7 +103,7 @@ mod tests {
     /// A second signal once ended the process with its rows unsaved: both kinds shared the flag that armed a forced end.
     #[test]
     fn however_many_signals_come_they_only_set_the_flag() {
-        let interrupt = Interrupt::watch().unwrap();
+        let interrupt = Interrupt::install().unwrap();
         assert!(!interrupt.came());
         for signal in [SIGINT, SIGTERM, SIGINT, SIGTERM] {
             signal_hook::low_level::raise(signal).unwrap();
@@ -113,7 +113,7 @@ mod tests {
 
     #[test]
     fn each_continuation_is_counted() {
-        let continued = Continued::watch().unwrap();
+        let continued = Continued::install().unwrap();
         for count in 1..=3 {
             signal_hook::low_level::raise(SIGCONT).unwrap();
             assert_eq!(continued.count(), count);
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_freeze_is_taken_once_and_ends_nothing() {
-        let freeze = Freeze::watch().unwrap();
+        let freeze = Freeze::install().unwrap();
         assert!(!freeze.take());
         signal_hook::low_level::raise(SIGUSR1).unwrap();
         assert!(freeze.take());
