@@ -26,7 +26,7 @@ mod gaps;
 use crate::say;
 use cli::ProbeArguments;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use gaps::{GapTotal, GapWatch};
+use gaps::{GapTotal, GapDetector};
 use protocol::exit::Exit;
 use realtime::privileges::parse_cpu_list;
 use realtime::signals::Continued;
@@ -167,13 +167,13 @@ fn begin(cpu: usize) -> Result<(), ProbeError> {
 
 struct SpinningThread {
     vitals: VitalsReader,
-    watch: GapWatch,
+    detector: GapDetector,
 }
 
 impl SpinningThread {
     fn begin(cpu: usize, gap_ns: u64, continued: Continued) -> Self {
         let vitals = VitalsReader::new(continued);
-        Self { vitals, watch: GapWatch::new(cpu as u64, gap_ns, MonotonicClock.now().as_nanos()) }
+        Self { vitals, detector: GapDetector::new(cpu as u64, gap_ns, MonotonicClock.now().as_nanos()) }
     }
 
     fn spin(mut self, gaps: &Sender<Gap>, state: &ProbeState) {
@@ -181,7 +181,7 @@ impl SpinningThread {
         while going_on {
             // Checked before the clock is read, so that a gap that outlasts the run is recorded too.
             going_on = !state.stop.came();
-            if let Some(gap) = self.watch.look(MonotonicClock.now().as_nanos(), || self.vitals.read())
+            if let Some(gap) = self.detector.look(MonotonicClock.now().as_nanos(), || self.vitals.read())
                 && gaps.try_send(gap).is_err()
             {
                 state.dropped.fetch_add(1, Ordering::Relaxed);

@@ -49,8 +49,8 @@ pub(crate) struct RoundTrip {
     pub ns: u64,
 }
 
-/// Exchange of one axis. Allocates nothing after the start.
-pub(crate) struct ExchangeWatch {
+/// Times the exchange of one axis. Allocates nothing after the start.
+pub(crate) struct ExchangeTimer {
     /// Time of sending of a cycle's sensors, by the cycle's low bits; 0: not sent.
     sent_ns: Box<[u64; ECHO_RANGE as usize]>,
     /// The last command taken in this cycle: arrival, and the cycle that it answers.
@@ -58,7 +58,7 @@ pub(crate) struct ExchangeWatch {
     now: AxisCycle,
 }
 
-impl ExchangeWatch {
+impl ExchangeTimer {
     /// Begins `cycle`, whose sensors were sent at `stamp_ns`, if at all.
     pub(crate) fn begin(&mut self, cycle: u64, stamp_ns: Option<u64>) {
         let sensors_ns = stamp_ns.unwrap_or(0);
@@ -93,7 +93,7 @@ impl ExchangeWatch {
     }
 }
 
-impl Default for ExchangeWatch {
+impl Default for ExchangeTimer {
     fn default() -> Self {
         Self { sent_ns: Box::new([0; ECHO_RANGE as usize]), taken: None, now: AxisCycle::default() }
     }
@@ -117,38 +117,38 @@ mod tests {
 
     #[test]
     fn a_command_is_joined_to_its_sensors_across_the_end_of_the_echo() {
-        let mut watch = ExchangeWatch::default();
-        watch.begin(4095, Some(4_095_000_050));
-        watch.begin(4096, Some(4_096_000_060));
-        assert_eq!(watch.taken(4095, 4_095_000_400, 4096), Some(350));
-        watch.latched(Some(1));
-        let AxisCycle { exchange, age_cycles, .. } = watch.cycle();
+        let mut timer = ExchangeTimer::default();
+        timer.begin(4095, Some(4_095_000_050));
+        timer.begin(4096, Some(4_096_000_060));
+        assert_eq!(timer.taken(4095, 4_095_000_400, 4096), Some(350));
+        timer.latched(Some(1));
+        let AxisCycle { exchange, age_cycles, .. } = timer.cycle();
         assert_eq!(
             exchange,
             Exchange { sensors_ns: 4_096_000_060, command_ns: 4_095_000_400, answers: 4095 }
         );
-        assert_eq!((age_cycles, watch.cycle().age_ns(4_096_000_000)), (1, Some(999_950)));
+        assert_eq!((age_cycles, timer.cycle().age_ns(4_096_000_000)), (1, Some(999_950)));
     }
 
     #[test]
     fn a_held_command_has_an_age_and_is_not_new() {
-        let mut watch = ExchangeWatch::default();
-        watch.begin(7, Some(7));
-        watch.begin(8, Some(8));
-        watch.latched(Some(2));
-        assert_eq!((watch.cycle().age_cycles, watch.cycle().exchange.command_ns), (2, 0));
-        assert_eq!(watch.cycle().age_ns(9), None);
+        let mut timer = ExchangeTimer::default();
+        timer.begin(7, Some(7));
+        timer.begin(8, Some(8));
+        timer.latched(Some(2));
+        assert_eq!((timer.cycle().age_cycles, timer.cycle().exchange.command_ns), (2, 0));
+        assert_eq!(timer.cycle().age_ns(9), None);
     }
 
     #[test]
     fn a_command_that_does_not_act_is_none_and_sensors_that_did_not_leave_have_no_round_trip() {
-        let mut watch = ExchangeWatch::default();
-        watch.begin(7, None);
-        watch.begin(8, Some(8));
-        assert_eq!(watch.taken(7, 20, 8), None);
-        watch.latched(None);
+        let mut timer = ExchangeTimer::default();
+        timer.begin(7, None);
+        timer.begin(8, Some(8));
+        assert_eq!(timer.taken(7, 20, 8), None);
+        timer.latched(None);
         assert_eq!(
-            watch.cycle(),
+            timer.cycle(),
             AxisCycle { exchange: Exchange { sensors_ns: 8, ..Exchange::default() }, ..AxisCycle::default() }
         );
     }

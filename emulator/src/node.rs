@@ -12,7 +12,7 @@
 
 use crate::console::Command;
 use crate::event::{Event, EventKind, axis_of, of_hand};
-use crate::exchange::{AxisCycle, ExchangeWatch, RoundTrip, TimingRecord};
+use crate::exchange::{AxisCycle, ExchangeTimer, RoundTrip, TimingRecord};
 use crate::faults::mark::Mark;
 use crate::faults::schedule::{FaultSchedule, FaultTargets};
 use crate::recording::Recorder;
@@ -73,7 +73,7 @@ pub(crate) struct EmulatorNode {
     bus_was_up: bool,
     bus_disconnects: u64,
     pub(crate) frames: FrameCounters,
-    exchange: [ExchangeWatch; 2],
+    exchange: [ExchangeTimer; 2],
     chains_done: [Option<bool>; 2],
 }
 
@@ -226,7 +226,7 @@ impl EmulatorNode {
 
     /// Records the time stamps of this cycle: `row` without the exchange, which the node adds.
     pub(crate) fn record_timing(&mut self, row: CycleTiming) {
-        let axes = self.exchange.each_ref().map(ExchangeWatch::cycle);
+        let axes = self.exchange.each_ref().map(ExchangeTimer::cycle);
         let [AxisCycle { exchange: drive, .. }, AxisCycle { exchange: load, .. }] = axes;
         self.recorder.timing(TimingRecord::Cycle { row: CycleTiming { drive, load, ..row }, axes });
     }

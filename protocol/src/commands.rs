@@ -7,7 +7,7 @@
 
 use crate::frames::ValveCommand;
 use crate::live_cycles::LiveCycles;
-use crate::sources::{SourceWatch, Step};
+use crate::sources::{Step, TwoSenderDetector};
 use serde::{Deserialize, Serialize};
 
 /// Age in cycles beyond which a command is stale (bus.md, Time).
@@ -29,7 +29,7 @@ pub struct CommandCounters {
     pub breaks: u64,
     /// Accepted commands that came a cycle or more later than the cycle after the one that they answer.
     pub late: u64,
-    /// Commands equal to the one before, counter and all; accepted all the same, and distinguished by the watch for two senders.
+    /// Commands equal to the one before, counter and all; accepted all the same, and distinguished by [`TwoSenderDetector`].
     pub duplicate: u64,
     /// Times that the fault `two-sources` began.
     pub two_sources: u64,
@@ -51,7 +51,7 @@ pub enum Change {
 /// The command path of one axis.
 #[derive(Default)]
 pub struct CommandIntake {
-    sources: SourceWatch,
+    sources: TwoSenderDetector,
     /// Acts from the next latch on, unless that drops it.
     stored: Option<ValveCommand>,
     /// The last one accepted, dropped or not.

@@ -41,15 +41,15 @@ struct LastFrame {
     answered: u64,
 }
 
-/// Watches the counter of one command identifier.
+/// Detects two senders by the counter of one command identifier.
 #[derive(Default)]
-pub struct SourceWatch {
+pub struct TwoSenderDetector {
     last: Option<LastFrame>,
     breaks: [Option<u64>; BREAKS_TO_LATCH],
     two_sources: bool,
 }
 
-impl SourceWatch {
+impl TwoSenderDetector {
     /// Takes note of a frame with counter `alive` that came in `cycle` and answers the cycle `answered`.
     pub fn note(&mut self, alive: u8, cycle: u64, answered: u64) -> Step {
         let step = match &self.last {
@@ -94,10 +94,10 @@ mod tests {
     use super::*;
 
     /// Feeds one frame a cycle from each sender whose counters start at `starts`, for `cycles` cycles.
-    fn feed(watch: &mut SourceWatch, starts: &[u8], cycles: std::ops::Range<u64>) {
+    fn feed(detector: &mut TwoSenderDetector, starts: &[u8], cycles: std::ops::Range<u64>) {
         for cycle in cycles {
             for start in starts {
-                watch.note(((u64::from(*start) + cycle) % 16) as u8, cycle, cycle);
+                detector.note(((u64::from(*start) + cycle) % 16) as u8, cycle, cycle);
             }
         }
     }
@@ -106,54 +106,54 @@ mod tests {
     fn two_senders_are_found_whatever_their_counters() {
         for first in 0..16 {
             for second in 0..16 {
-                let mut watch = SourceWatch::default();
-                feed(&mut watch, &[first, second], 0..20);
-                assert!(watch.two_sources(19), "counters starting at {first} and {second}");
+                let mut detector = TwoSenderDetector::default();
+                feed(&mut detector, &[first, second], 0..20);
+                assert!(detector.two_sources(19), "counters starting at {first} and {second}");
             }
         }
     }
 
     #[test]
     fn one_sender_is_never_two_even_with_loss_and_restarts() {
-        let mut watch = SourceWatch::default();
-        feed(&mut watch, &[3], 0..50);
-        feed(&mut watch, &[3], 60..70);
+        let mut detector = TwoSenderDetector::default();
+        feed(&mut detector, &[3], 0..50);
+        feed(&mut detector, &[3], 60..70);
         // Two restarts in quick succession.
-        feed(&mut watch, &[9], 70..73);
-        feed(&mut watch, &[1], 73..90);
-        assert!(!watch.two_sources(89));
+        feed(&mut detector, &[9], 70..73);
+        feed(&mut detector, &[1], 73..90);
+        assert!(!detector.two_sources(89));
     }
 
     #[test]
     fn the_fault_goes_when_one_sender_has_been_silent_for_twenty_cycles() {
-        let mut watch = SourceWatch::default();
-        feed(&mut watch, &[0, 5], 0..40);
-        assert!(watch.two_sources(40));
-        feed(&mut watch, &[0], 40..60);
-        assert!(watch.two_sources(59), "still within twenty cycles of the last break");
-        feed(&mut watch, &[0], 60..61);
-        assert!(!watch.two_sources(60));
+        let mut detector = TwoSenderDetector::default();
+        feed(&mut detector, &[0, 5], 0..40);
+        assert!(detector.two_sources(40));
+        feed(&mut detector, &[0], 40..60);
+        assert!(detector.two_sources(59), "still within twenty cycles of the last break");
+        feed(&mut detector, &[0], 60..61);
+        assert!(!detector.two_sources(60));
     }
 
     #[test]
     fn lost_frames_are_counted_by_the_gap() {
-        let mut watch = SourceWatch::default();
-        watch.note(4, 10, 9);
-        assert_eq!(watch.note(5, 11, 10), Step::Continues { lost: 0 });
-        assert_eq!(watch.note(8, 14, 13), Step::Continues { lost: 2 });
-        assert_eq!(watch.note(9, 14, 13), Step::Continues { lost: 0 });
-        assert_eq!(watch.note(9, 15, 14), Step::Breaks);
-        assert_eq!(watch.note(13, 36, 35), Step::Continues { lost: 0 }, "after a silence of 21 cycles");
+        let mut detector = TwoSenderDetector::default();
+        detector.note(4, 10, 9);
+        assert_eq!(detector.note(5, 11, 10), Step::Continues { lost: 0 });
+        assert_eq!(detector.note(8, 14, 13), Step::Continues { lost: 2 });
+        assert_eq!(detector.note(9, 14, 13), Step::Continues { lost: 0 });
+        assert_eq!(detector.note(9, 15, 14), Step::Breaks);
+        assert_eq!(detector.note(13, 36, 35), Step::Continues { lost: 0 }, "after a silence of 21 cycles");
     }
 
     #[test]
     fn a_frame_lost_out_of_a_burst_is_counted() {
-        let mut watch = SourceWatch::default();
-        watch.note(4, 10, 9);
+        let mut detector = TwoSenderDetector::default();
+        detector.note(4, 10, 9);
         // The sender stood still for five cycles and answers them at once; the third answer is lost.
-        assert_eq!(watch.note(5, 15, 10), Step::Continues { lost: 0 });
-        assert_eq!(watch.note(6, 15, 11), Step::Continues { lost: 0 });
-        assert_eq!(watch.note(8, 15, 13), Step::Continues { lost: 1 });
-        assert_eq!(watch.note(9, 15, 14), Step::Continues { lost: 0 });
+        assert_eq!(detector.note(5, 15, 10), Step::Continues { lost: 0 });
+        assert_eq!(detector.note(6, 15, 11), Step::Continues { lost: 0 });
+        assert_eq!(detector.note(8, 15, 13), Step::Continues { lost: 1 });
+        assert_eq!(detector.note(9, 15, 14), Step::Continues { lost: 0 });
     }
 }

@@ -76,4 +76,4 @@ pub use privileges::{Grant, Grants, Refusal, Request, acquire};
 pub use signals::{Continued, Freeze, Interrupt};
 pub use stages::{CycleStages, StageAccount, StageFigures};
 pub use vitals::{VitalCounts, VitalTotals, VitalsReader};
-pub use wall_clock::{WallClockStep, WallClockWatch};
+pub use wall_clock::{WallClockStep, WallClockStepDetector};

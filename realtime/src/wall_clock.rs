@@ -1,4 +1,4 @@
-//! Watches whether somebody set the time of day while a run went on.
+//! Detects whether somebody set the time of day during a run.
 //!
 //! Everything is scheduled and stamped on the monotonic clock, so a step of the wall clock must change nothing; that it happened
 //! belongs into the record all the same. The two clocks differ by an offset, which the slewing of a time daemon moves by at most
@@ -22,28 +22,28 @@ const TRIES: u32 = 5;
 #[derive(Clone, Copy, Debug, PartialEq, Default, Serialize, Deserialize)]
 #[serde(default)]
 pub struct WallClockStep {
-    /// When it was noticed, in s after the watch began.
+    /// When it was noticed, in s after the start.
     pub at_s: f64,
     /// How far the clock was set, in s, forward being positive.
     pub step_s: f64,
 }
 
-/// Compares the wall clock with the monotonic one.
+/// Detects steps by comparing the wall clock with the monotonic one.
 #[derive(Debug)]
-pub struct WallClockWatch {
+pub struct WallClockStepDetector {
     began: Instant,
     offset_ns: i128,
 }
 
-impl WallClockWatch {
-    /// Begins watching.
+impl WallClockStepDetector {
+    /// Starts with the offset of now.
     #[must_use]
     pub fn begin() -> Self {
         let (began, offset_ns) = offset_ns();
         Self { began, offset_ns }
     }
 
-    /// Tells a step since the last look.
+    /// The step since the last look, if any.
     pub fn look(&mut self) -> Option<WallClockStep> {
         let (now, offset_ns) = offset_ns();
         self.judge(now, offset_ns)
@@ -83,19 +83,19 @@ mod tests {
 
     #[test]
     fn a_step_is_reported_once_and_a_slew_never() {
-        let mut watch = WallClockWatch { began: Instant::from_nanos(0), offset_ns: 1_000_000_000 };
+        let mut detector = WallClockStepDetector { began: Instant::from_nanos(0), offset_ns: 1_000_000_000 };
         let at = |ms: u64| Instant::from_nanos(ms * 1_000_000);
-        assert_eq!(watch.judge(at(4), 1_000_002_000), None);
-        let reported = watch.judge(at(2000), 4_600_002_000);
+        assert_eq!(detector.judge(at(4), 1_000_002_000), None);
+        let reported = detector.judge(at(2000), 4_600_002_000);
         assert_eq!(reported, Some(WallClockStep { at_s: 2.0, step_s: 3.6 }));
-        assert_eq!(watch.judge(at(2004), 4_600_004_000), None);
-        let back = watch.judge(at(2008), 1_000_004_000);
+        assert_eq!(detector.judge(at(2004), 4_600_004_000), None);
+        let back = detector.judge(at(2008), 1_000_004_000);
         assert_eq!(back.map(|step| step.step_s), Some(-3.6));
     }
 
     #[test]
     fn an_untouched_clock_does_not_step() {
-        let mut watch = WallClockWatch::begin();
-        assert_eq!((0..100).filter_map(|_| watch.look()).count(), 0);
+        let mut detector = WallClockStepDetector::begin();
+        assert_eq!((0..100).filter_map(|_| detector.look()).count(), 0);
     }
 }

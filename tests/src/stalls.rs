@@ -1,6 +1,6 @@
 //! Whether the machine kept a program from running: what the kernel counts of its threads' waiting for a processor.
 //!
-//! A test in real time may fail since the machine stood still, and may be tried again for that reason alone. The watcher reads
+//! A test in real time may fail since the machine stood still, and may be tried again for that reason alone. A thread reads
 //! each 5 ms how long the threads have waited so far (`/proc/PID/task/TID/schedstat`); if it is late itself, that is a stall too.
 
 use crate::process_table::with_command_line;
@@ -16,29 +16,29 @@ const LOOK_EVERY: Duration = Duration::from_millis(5);
 /// Programs are looked for so often, in looks.
 const FIND_EVERY: u32 = 20;
 
-/// Watches until its result is asked for.
+/// Measures until its result is asked for.
 #[must_use]
-pub struct StallWatch {
+pub struct StallDetector {
     stop: Arc<AtomicBool>,
-    watcher: JoinHandle<Duration>,
+    measuring: JoinHandle<Duration>,
 }
 
-impl StallWatch {
+impl StallDetector {
     /// Of the programs with this word on their command line, which may start later.
     pub fn of(word: &str) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let (stopped, word) = (Arc::clone(&stop), word.to_owned());
-        Self { stop, watcher: std::thread::spawn(move || watch(&word, &stopped)) }
+        Self { stop, measuring: std::thread::spawn(move || measure(&word, &stopped)) }
     }
 
-    /// The longest that a thread waited for a processor in one go, or the watcher.
+    /// The longest that a thread waited for a processor in one go, or the measuring thread.
     pub fn longest(self) -> Duration {
         self.stop.store(true, Ordering::Relaxed);
-        self.watcher.join().expect("the watcher does not panic")
+        self.measuring.join().expect("the measuring thread does not panic")
     }
 }
 
-fn watch(word: &str, stop: &AtomicBool) -> Duration {
+fn measure(word: &str, stop: &AtomicBool) -> Duration {
     let mut longest = Duration::ZERO;
     let mut programs = Vec::new();
     let mut waited: BTreeMap<PathBuf, Duration> = BTreeMap::new();

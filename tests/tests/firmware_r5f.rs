@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use std::time::Duration;
 use system_tests::firmware::{Positioned, build, positioned_where_it_ran};
 use system_tests::foreign_python::{python, tools_path};
-use system_tests::stalls::StallWatch;
+use system_tests::stalls::StallDetector;
 use system_tests::{
     Build, PATIENCE, Pace, Packet, Program, Running, Scene, count, executable, shipped_programs, turn,
     workspace,
@@ -113,7 +113,7 @@ fn it_positions_within_the_bounds_in_real_time() {
     let _turn = turn::take();
     let done = (1..=ATTEMPTS)
         .find_map(|attempt| {
-            let stalls = StallWatch::of(elf.to_str().expect("text"));
+            let stalls = StallDetector::of(elf.to_str().expect("text"));
             let done = positions(&elf);
             let stalled = stalls.longest();
             eprintln!("attempt {attempt} of {ATTEMPTS}: kept from running for {stalled:?}");
@@ -167,7 +167,7 @@ fn the_check_of_controllers_passes_its_function() {
     let elf = elf();
     let _turn = turn::take();
     for attempt in 1..=ATTEMPTS {
-        let stalls = StallWatch::of(elf.to_str().expect("text"));
+        let stalls = StallDetector::of(elf.to_str().expect("text"));
         let (words, others) = checked();
         let stalled = stalls.longest();
         eprintln!(

@@ -26,15 +26,15 @@ fn was_preempted(counted: &VitalCounts, length_ns: u64) -> bool {
 
 /// Finds gaps in the readings of the clock on one CPU.
 #[derive(Debug)]
-pub(super) struct GapWatch {
+pub(super) struct GapDetector {
     cpu: u64,
     gap_ns: u64,
     last_ns: u64,
     refreshed_ns: u64,
 }
 
-impl GapWatch {
-    /// A watch whose first reading is `now_ns`.
+impl GapDetector {
+    /// A detector whose first reading is `now_ns`.
     pub(super) fn new(cpu: u64, gap_ns: u64, now_ns: u64) -> Self {
         Self { cpu, gap_ns, last_ns: now_ns, refreshed_ns: now_ns }
     }
@@ -82,14 +82,14 @@ mod tests {
 
     #[test]
     fn only_a_pause_longer_than_asked_is_a_gap_and_it_goes_from_look_to_look() {
-        let mut watch = GapWatch::new(3, GAP_NS, 1_000);
-        assert_eq!(watch.look(1_000 + GAP_NS, VitalCounts::default), None);
-        let gap = watch.look(1_001 + 2 * GAP_NS, VitalCounts::default).expect("a nanosecond too long");
+        let mut detector = GapDetector::new(3, GAP_NS, 1_000);
+        assert_eq!(detector.look(1_000 + GAP_NS, VitalCounts::default), None);
+        let gap = detector.look(1_001 + 2 * GAP_NS, VitalCounts::default).expect("a nanosecond too long");
         assert_eq!(
             gap,
             Gap { cpu: 3, from_ns: 1_000 + GAP_NS, to_ns: 1_001 + 2 * GAP_NS, another_ran: false }
         );
-        assert_eq!(watch.look(gap.to_ns + 50, VitalCounts::default), None, "a gap is reported once");
+        assert_eq!(detector.look(gap.to_ns + 50, VitalCounts::default), None, "a gap is reported once");
     }
 
     #[test]
@@ -105,26 +105,26 @@ mod tests {
             // Stopped by a signal: the machine has nothing to do with it.
             (counts(1, 0, 2_000), true),
         ] {
-            let mut watch = GapWatch::new(3, GAP_NS, 0);
-            let gap = watch.look(1_000_000, || counted).expect("1 ms is a gap");
+            let mut detector = GapDetector::new(3, GAP_NS, 0);
+            let gap = detector.look(1_000_000, || counted).expect("1 ms is a gap");
             assert_eq!(gap.another_ran, another_ran, "{counted:?}");
         }
     }
 
     #[test]
     fn counts_from_before_the_last_millisecond_are_forgotten() {
-        let mut watch = GapWatch::new(3, GAP_NS, 0);
+        let mut detector = GapDetector::new(3, GAP_NS, 0);
         let mut pending = counts(0, 1, 60_000);
         let mut asked = 0;
         for now_ns in (50_000..=1_000_000).step_by(50_000) {
-            let reported = watch.look(now_ns, || {
+            let reported = detector.look(now_ns, || {
                 asked += 1;
                 std::mem::take(&mut pending)
             });
             assert_eq!(reported, None);
         }
         assert_eq!(asked, 1, "read once a millisecond");
-        let gap = watch.look(1_200_000, || pending).expect("200 us are a gap");
+        let gap = detector.look(1_200_000, || pending).expect("200 us are a gap");
         assert!(!gap.another_ran, "the switch was long before");
     }
 

@@ -7,7 +7,7 @@ use crate::exchange::{AxisCycle, RoundTrip, TimingRecord};
 use plant::Axis;
 use protocol::frames::{MessageSpec, RIG_STATUS};
 use realtime::stages::ExtraHistogram;
-use realtime::{Percentiles, WallClockStep, WallClockWatch};
+use realtime::{Percentiles, WallClockStep, WallClockStepDetector};
 use runlog::candump::FrameRecord;
 use runlog::process::Process;
 use runlog::timing::CycleTiming;
@@ -41,7 +41,7 @@ pub(crate) struct RigTiming {
     trips: VecDeque<RoundTrip>,
     command_age: [ExtraHistogram; 2],
     ages: CommandAges,
-    wall_clock: WallClockWatch,
+    wall_clock: WallClockStepDetector,
     steps: Vec<WallClockStep>,
 }
 
@@ -56,7 +56,7 @@ impl RigTiming {
             trips: VecDeque::new(),
             command_age,
             ages: CommandAges::default(),
-            wall_clock: WallClockWatch::begin(),
+            wall_clock: WallClockStepDetector::begin(),
             steps: Vec::new(),
         })
     }
