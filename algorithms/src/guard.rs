@@ -1,4 +1,4 @@
-//! The watch over every algorithm, shipped or foreign: what it returns is a number, and it returns in time.
+//! Supervises an algorithm, shipped or foreign: its result must be finite and come within its time limit.
 //!
 //! ```text
 //!            NaN or infinite            ┌────────────────────┐
@@ -8,9 +8,9 @@
 //!    └───────────────── each step       └────────────────────┘
 //! ```
 //!
-//! A finite result of any size passes: the post-controller limits it to what the valve can do. Time is watched where it
+//! A finite result of any size passes: the post-controller limits it to what the valve can do. Time is checked where it
 //! is real; a rehearsal and a run in lockstep have no clock here, so that their results do not depend on the machine.
-//! The watch sees a step only when it has returned. For one that never does, the rig shuts its valve on commands older than 20
+//! The guard sees a step only when it has returned. For one that never does, the rig shuts its valve on commands older than 20
 //! cycles, the partner misses this controller, and another thread ends the process: see [`HangDetector`].
 
 use crate::algorithm::{Algorithm, AlgorithmInput};
@@ -81,7 +81,7 @@ pub enum AlgorithmFault {
     },
 }
 
-/// An algorithm under watch.
+/// A supervised algorithm.
 pub struct Guarded {
     algorithm: Box<dyn Algorithm>,
     clock: Option<Box<dyn Clock + Send>>,
@@ -92,7 +92,7 @@ pub struct Guarded {
 }
 
 impl Guarded {
-    /// Watches `algorithm`; its time only with a `clock`, which belongs to runs in real time.
+    /// Supervises `algorithm`; its time only with a `clock`, which belongs to runs in real time.
     #[must_use]
     pub fn new(algorithm: Box<dyn Algorithm>, clock: Option<Box<dyn Clock + Send>>) -> Self {
         Self { algorithm, clock, slow: 0, fault: None }
@@ -176,7 +176,7 @@ mod tests {
         }
 
         fn wait_until(&self, _deadline: Instant) {
-            unreachable!("the watch never waits");
+            unreachable!("the guard never waits");
         }
     }
 

@@ -3,7 +3,7 @@
 //! | file | holds |
 //! |---|---|
 //! | [`algorithm`] | what an algorithm gets, what it returns, how it is listed |
-//! | [`guard`] | the watch over every algorithm: finite results, in time |
+//! | [`guard`] | supervises an algorithm: its result must be finite and come within its time limit |
 //! | [`linearisation`] | from a velocity to a valve opening |
 //! | [`rest_zone`] | when a rod is left alone |
 //! | `laws` | what every algorithm must keep; in tests alone |

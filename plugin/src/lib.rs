@@ -8,7 +8,7 @@
 //!
 //! Everything that a library says is looked at once, when it is loaded: version, size, functions, texts, ranges. After that a
 //! step is one call through a pointer: no allocation, no lock. That its results are numbers and that it returns in time is
-//! watched by [`algorithms::guard`], as for every algorithm.
+//! checked by [`algorithms::guard`], as for every algorithm.
 //!
 //! A library runs with all rights of the controller. The trial keeps mistakes out, not malice. Libraries are loaded
 //! before the thread asks for real-time priority, since the trial takes tens of milliseconds.

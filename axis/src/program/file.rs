@@ -102,7 +102,7 @@ impl Source {
     }
 
     /// The program of `axis` that the file describes, for a rig of these nominal numbers. The time that an algorithm takes is
-    /// watched where it is `real_time`.
+    /// checked where it is `real_time`.
     ///
     /// # Errors
     /// [`SettingsError`] for unknown keys and algorithms, values out of range, a library that cannot be loaded, and an algorithm

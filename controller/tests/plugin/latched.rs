@@ -1,4 +1,4 @@
-//! Libraries that pass their trial and fail later: the watch latches and nothing of theirs leaves any more.
+//! Libraries that pass their trial and fail later: the guard latches and nothing of theirs leaves any more.
 
 use crate::build::{Libraries, trier};
 use algorithms::algorithm::AlgorithmInput;
@@ -7,7 +7,7 @@ use nominal::RigParameters;
 use plugin::load_tried_by;
 use realtime::MonotonicClock;
 
-/// The library of `options` under watch, after 999 good steps.
+/// The library of `options` under the guard, after 999 good steps.
 fn after_999_steps(libraries: &Libraries, options: &[&str], real_time: bool) -> Guarded {
     let mut all = vec!["-DSTEP_NUMBER=1000"];
     all.extend(options);

@@ -88,7 +88,7 @@ pub struct People {
 #[derive(Debug, Clone, Copy)]
 struct PositionTrigger {
     position_m: f64,
-    /// The carriage was short of it when the watch began.
+    /// The carriage was short of it when the trigger was set.
     short: bool,
     action: Action,
 }

@@ -67,7 +67,7 @@ fn a_reset_forgets_that_the_axis_has_passed() {
 }
 
 #[test]
-fn a_step_at_a_position_in_a_later_segment_begins_its_own_watch() {
+fn a_step_at_a_position_in_a_later_segment_triggers_on_its_own() {
     let step = "law = 'step'; at_position_m = 0.2; duration_s = 1";
     let mut source = source(&format!("{step}; to_n = 300 + {step}; to_n = 50"));
     let _ = [0.1, 0.3].map(|position_m| source.at(0.1, &at(position_m)));
