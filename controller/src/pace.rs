@@ -67,12 +67,12 @@ pub(crate) fn run_real(
     let mut was_up = true;
     let mut ever_up = false;
     let mut disconnects = 0;
-    let mut watch = None;
+    let mut count_scope = None;
     stopwatch.begin();
     let end = loop {
         bus.wait_readable(LONGEST_WAIT);
-        if watch.is_none() && node.answered >= WARM_UP {
-            watch = Some(realtime::allocations::watch());
+        if count_scope.is_none() && node.answered >= WARM_UP {
+            count_scope = Some(realtime::allocations::count_scope());
         }
         stopwatch.woke();
         while let Received::Frame(frame, stamp_ns) = bus.receive() {
@@ -111,8 +111,8 @@ pub(crate) fn run_real(
             break RunEnd::BusGone;
         }
     };
-    let allocations = watch.map(|watch| {
-        drop(watch);
+    let allocations = count_scope.map(|scope| {
+        drop(scope);
         realtime::allocations::counted()
     });
     RunOutcome { end, allocations, stopwatch: stopwatch.finish() }

@@ -12,7 +12,7 @@ mod schema;
 static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;
 
 use model::{Direction, Failure, Inputs, Model, Program, Simulator, Start};
-use realtime::allocations::{counted, reset, watch};
+use realtime::allocations::{count_scope, counted, reset};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -21,9 +21,9 @@ pub(crate) fn counting<R>(run: impl FnOnce() -> R) -> (R, u64) {
     static COUNT: Mutex<()> = Mutex::new(());
     let _mine = COUNT.lock().unwrap_or_else(PoisonError::into_inner);
     reset();
-    let watching = watch();
+    let scope = count_scope();
     let result = run();
-    drop(watching);
+    drop(scope);
     (result, counted())
 }
 

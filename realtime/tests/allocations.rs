@@ -8,7 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-use realtime::allocations::{CountingAllocator, counted, reset, watch};
+use realtime::allocations::{CountingAllocator, count_scope, counted, reset};
 use realtime::{Clock, MonotonicClock, OverrunPolicy, PeriodicConfig, PeriodicLoop, Recorder, VirtualClock};
 
 #[global_allocator]
@@ -28,17 +28,17 @@ fn push_one() -> Vec<u64> {
 }
 
 #[test]
-fn a_push_is_counted_inside_the_watch_and_not_outside() {
+fn a_push_is_counted_inside_the_scope_and_not_outside() {
     let _turn = counter_for_this_test_alone();
     drop(push_one());
     assert_eq!(counted(), 0);
 
-    let watching = watch();
+    let scope = count_scope();
     let vector = push_one();
     assert_eq!(counted(), 1);
     drop(vector);
     assert_eq!(counted(), 2, "giving back counts too");
-    drop(watching);
+    drop(scope);
 
     drop(push_one());
     assert_eq!(counted(), 2);
@@ -49,7 +49,7 @@ fn growing_and_zeroed_blocks_are_counted() {
     let _turn = counter_for_this_test_alone();
     let mut vector = push_one();
     {
-        let _watching = watch();
+        let _scope = count_scope();
         vector.reserve_exact(black_box(1000));
         assert_eq!(counted(), 1);
         black_box(vec![0_u8; black_box(1000)]);
@@ -73,7 +73,7 @@ fn another_thread_is_not_counted() {
             (0..100).for_each(|_| drop(push_one()));
             done.store(true, Ordering::Release);
         });
-        let _watching = watch();
+        let _scope = count_scope();
         go.store(true, Ordering::Release);
         wait_for(&done);
         assert_eq!(counted(), 0);
@@ -81,10 +81,10 @@ fn another_thread_is_not_counted() {
 }
 
 #[test]
-fn a_watch_in_a_watch_ends_with_the_outer_one() {
+fn a_scope_in_a_scope_ends_with_the_outer_one() {
     let _turn = counter_for_this_test_alone();
-    let outer = watch();
-    drop(watch());
+    let outer = count_scope();
+    drop(count_scope());
     let vector = push_one();
     drop(outer);
     assert_eq!(counted(), 1);
@@ -101,7 +101,7 @@ fn a_loop_of_thousands_of_cycles_allocates_nothing_for_any_wobble() {
     let mut periodic = PeriodicLoop::new(&clock, config, clock.now() + period);
     let mut recorder = Recorder::new();
 
-    let watching = watch();
+    let scope = count_scope();
     for _ in 0..5000 {
         let cycle = periodic.next_cycle().expect("catches up");
         clock.advance(Duration::from_micros(300));
@@ -111,7 +111,7 @@ fn a_loop_of_thousands_of_cycles_allocates_nothing_for_any_wobble() {
     }
     clock.step_forward(Duration::from_secs(3600));
     periodic.next_cycle().expect("catches up");
-    drop(watching);
+    drop(scope);
 
     assert_eq!(counted(), 0);
     assert!(periodic.statistics.overruns > 0, "the rare paths ran too");
@@ -127,10 +127,10 @@ fn the_real_clock_and_an_overrun_that_stops_allocate_nothing() {
     // Due long ago, so that it must stop, whatever the machine does.
     let mut periodic = PeriodicLoop::new(clock, config, clock.now().saturating_sub(Duration::from_millis(1)));
 
-    let watching = watch();
+    let scope = count_scope();
     clock.wait_until(clock.now() + period);
     let outcome = periodic.next_cycle();
-    drop(watching);
+    drop(scope);
 
     assert!(outcome.is_err());
     assert_eq!(counted(), 0);

@@ -3,7 +3,7 @@
 //!
 //! The programs are built once more, with the allocator that counts inside the 1 ms path; nothing else differs. That this
 //! counter does count is proven where it lives: `realtime/tests/allocations.rs`,
-//! `a_push_is_counted_inside_the_watch_and_not_outside`.
+//! `a_push_is_counted_inside_the_scope_and_not_outside`.
 
 use protocol::can::CanFrame;
 use rustix::process::Signal;

@@ -87,7 +87,7 @@ fn a_step_through_the_library_allocates_nothing() {
     let input = AlgorithmInput { period_s: 0.001, set_position_m: 0.1, ..AlgorithmInput::default() };
     guarded.reset(&input, &values).unwrap();
     let (before, sum) = {
-        let _watch = allocations::watch();
+        let _scope = allocations::count_scope();
         let before = allocations::counted();
         (before, (0..1000).map(|_| guarded.step(&input, &values).unwrap_or(0.0)).sum::<f64>())
     };

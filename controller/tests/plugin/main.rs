@@ -13,6 +13,6 @@ mod refused;
 /// So that `position_pi.rs` compiles as it would beside the shipped algorithms.
 use algorithms::algorithm;
 
-/// Counts what the watched part of a test allocates.
+/// Counts what a test allocates inside a scope.
 #[global_allocator]
 static ALLOCATOR: realtime::allocations::CountingAllocator = realtime::allocations::CountingAllocator;

@@ -26,7 +26,7 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
     let mut inbox = Inbox::new();
     let mut bus_lost_at: Option<u64> = None;
     let mut cycles = 0;
-    let mut watch = None;
+    let mut count_scope = None;
     let grace_cycles = context.limits.bus_grace.as_millis() as u64;
     let end = loop {
         let cycle = match periodic.next_cycle() {
@@ -37,8 +37,8 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
             }
         };
         let index = cycle.index;
-        if watch.is_none() && index >= WARM_UP_CYCLES {
-            watch = Some(realtime::allocations::watch());
+        if count_scope.is_none() && index >= WARM_UP_CYCLES {
+            count_scope = Some(realtime::allocations::count_scope());
         }
         let RunContext { node, bus, .. } = &mut context;
         node.miss(index - cycle.skipped, cycle.skipped);
@@ -79,8 +79,8 @@ pub(crate) fn run<C: Clock>(mut context: RunContext<'_>, clock: C, config: Perio
             break end;
         }
     };
-    let allocations = watch.map(|watch| {
-        drop(watch);
+    let allocations = count_scope.map(|scope| {
+        drop(scope);
         realtime::allocations::counted()
     });
     // A faulty rig is silent; the second rig on a bus does not end the first one's controllers.
