@@ -1,4 +1,4 @@
-//! What the controllers of a run tell of themselves: `controller.json` (one process for both axes), or
+//! Reports of the controllers of a run: `controller.json` (one process for both axes), or
 //! `controller-drive.json` and `controller-load.json` (a process each).
 //!
 //! The rig removes the reports of an earlier run when it starts, and not the tables, which a controller that started before
