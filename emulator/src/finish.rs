@@ -19,7 +19,7 @@ pub(crate) fn finish(
     outcome: LoopOutcome,
     written: WriterReport,
 ) -> Result<Exit, RunError> {
-    let (exit, reason) = verdict(&outcome.paced.end);
+    let (exit, reason) = verdict(&outcome.run.end);
     protocol::say!("emulator: {reason}");
     let path = arguments.out.join(SUMMARY_JSON);
     let summary = summarise(outcome, written, started.epoch_offset_ns, reason, exit == Exit::Good);
@@ -54,11 +54,11 @@ fn summarise(
     ended_because: String,
     passed: bool,
 ) -> Summary<Event> {
-    let LoopOutcome { paced, figures, bus, host: bus_host } = outcome;
+    let LoopOutcome { run, figures, bus, host: bus_host } = outcome;
     let [drive_commands, load_commands] = figures.commands;
     let both = [drive_commands, load_commands];
     let lost = both.iter().map(|commands| commands.lost).sum();
-    let loops = paced.statistics.as_ref();
+    let loops = run.statistics.as_ref();
     let percentiles = |recorder: Option<&Histogram>| {
         recorder.map_or_else(|| Histogram::new().percentiles(), Histogram::percentiles)
     };
@@ -72,8 +72,8 @@ fn summarise(
         schema_version: SCHEMA_VERSION,
         position_error_dynamic_m: None,
         position_error_static_m: None,
-        bus_log_cycle_zero_s: (paced.cycle_zero_ns + epoch_offset_ns) as f64 * 1e-9,
-        cycles: Some(paced.cycles),
+        bus_log_cycle_zero_s: (run.cycle_zero_ns + epoch_offset_ns) as f64 * 1e-9,
+        cycles: Some(run.cycles),
         skipped: Some(figures.skipped),
         overruns: loops.map_or(0, |statistics| statistics.overruns),
         late_completions: loops.map_or(0, |statistics| statistics.late_completions),
@@ -101,7 +101,7 @@ fn summarise(
         flight: timing.flight,
         wall_clock_steps: rig_timing.wall_clock_steps,
         vitals: timing.vitals,
-        allocations_in_cycle: paced.allocations.filter(|_| allocations::is_registered()),
+        allocations_in_cycle: run.allocations.filter(|_| allocations::is_registered()),
         records_dropped: Some(figures.records_dropped),
         ended_because,
         passed: Some(passed),

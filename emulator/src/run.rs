@@ -180,7 +180,7 @@ impl RunStart {
 }
 
 pub(crate) struct LoopOutcome {
-    pub(crate) paced: RunOutcome,
+    pub(crate) run: RunOutcome,
     pub(crate) figures: NodeFigures,
     pub(crate) bus: BusCounters,
     pub(crate) host: Option<HostReport>,
@@ -220,13 +220,13 @@ impl RigLoop<'_> {
             cycle: Duration::from_secs_f64(arguments.lockstep_timeout),
         };
         let context = RunContext { node: &mut node, bus, limits: &limits, shared };
-        let paced = match arguments.pace {
+        let run = match arguments.pace {
             Pace::Real => pace::real::run(context, MonotonicClock, periodic),
             Pace::Lockstep => pace::lockstep::run(context, simulated_ns)?,
         };
         // Dropping the node drops the senders of the queues, so that the writer ends.
         let host = bus.host_report();
-        Ok(LoopOutcome { paced, figures: node.into_figures(), bus: *bus.counters(), host })
+        Ok(LoopOutcome { run, figures: node.into_figures(), bus: *bus.counters(), host })
     }
 }
 
