@@ -10,7 +10,7 @@
 //! |---|---|
 //! | [`plan`] | the properties of each segment |
 //! | [`segment`], [`processes`], [`procfs`] | one segment while it runs |
-//! | [`evidence`], [`frame_log`] | reading what it left |
+//! | [`segment_files`], [`frame_log`] | reading what it left |
 //! | [`account`], [`memory`] | sent = received + lost, to the frame; whether memory is flat |
 //! | [`judge`] | every check of a segment |
 //! | [`model`], [`keeping`], [`merged`], [`junit`], [`verdict`] | results of all segments, and their files |
@@ -20,7 +20,6 @@
 
 mod account;
 pub(crate) mod cli;
-mod evidence;
 mod frame_log;
 mod judge;
 mod junit;
@@ -33,6 +32,7 @@ pub(crate) mod processes;
 mod procfs;
 mod rotate;
 mod segment;
+mod segment_files;
 mod verdict;
 
 use cli::{SoakArguments, YesNo};

@@ -4,7 +4,7 @@
 //! memory does not depend on its length.
 
 use super::account::Counts;
-use super::evidence::counts;
+use super::segment_files::counts;
 use protocol::bus::OTHERS;
 use protocol::can::CanFrame;
 use protocol::frames::{DRIVE_VALVE_COMMAND, Frame, LOAD_VALVE_COMMAND, MESSAGES};

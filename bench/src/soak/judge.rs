@@ -2,11 +2,11 @@
 
 use super::EMULATOR;
 use super::account::{self, FrameAccount};
-use super::evidence::{SegmentFiles, counts};
 use super::memory::{GROWTH_LIMIT_PERCENT, Memory, SLOPE_LIMIT_KIB_PER_H};
 use super::model::{Check, CheckResult, Figures};
 use super::plan::SegmentSpec;
 use super::segment::{Outcome, SegmentEnd};
+use super::segment_files::{SegmentFiles, counts};
 use figures::thresholds::{self, ByRepetition, FigureValue};
 use figures::top::POSITIONS;
 use runlog::summary::{JudgedBound, ProcessReport};
@@ -33,8 +33,8 @@ pub(super) fn judge(
     outcome: &Outcome,
     judge_positions: bool,
 ) -> SegmentVerdict {
-    let evidence = SegmentFiles::read(spec, folder);
-    let account = evidence.account(outcome);
+    let files = SegmentFiles::read(spec, folder);
+    let account = files.account(outcome);
     let memory: BTreeMap<_, _> =
         outcome.memory.iter().map(|(name, record)| (name.clone(), Memory::of(record))).collect();
     let mut checks = vec![processes(outcome)];
@@ -44,19 +44,15 @@ pub(super) fn judge(
             result("gaps", &account.gaps_broken, || {
                 "missing frames are the same by counts and by gaps".into()
             }),
-            loss(spec, &evidence, account),
+            loss(spec, &files, account),
         ]),
         Err(why) => {
             checks.extend(["account", "gaps", "loss"].map(|name| Check::new(name, CheckResult::Failed, why)))
         }
     }
-    checks.extend([
-        records(&evidence, outcome),
-        memory_check(&memory),
-        positions(&evidence, judge_positions),
-    ]);
+    checks.extend([records(&files, outcome), memory_check(&memory), positions(&files, judge_positions)]);
     let account = account.unwrap_or_default();
-    SegmentVerdict { checks, figures: evidence.figures(), account, memory, machine: evidence.machine.clone() }
+    SegmentVerdict { checks, figures: files.figures(), account, memory, machine: files.machine.clone() }
 }
 
 /// Passed when nothing is broken.
@@ -100,8 +96,8 @@ fn account_summary(account: &FrameAccount) -> String {
 }
 
 /// Checks the rate of the injected loss; whether every lost frame was found is checked by the account and the gaps.
-fn loss(spec: &SegmentSpec, evidence: &SegmentFiles, account: &FrameAccount) -> Check {
-    let host = evidence.summary.bus_host.as_ref();
+fn loss(spec: &SegmentSpec, files: &SegmentFiles, account: &FrameAccount) -> Check {
+    let host = files.summary.bus_host.as_ref();
     let injected = host.map_or(0, |host| host.injected_loss.total());
     let Some(loss) = spec.loss else {
         let detail = format!("no loss asked for, {injected} frames lost on purpose");
@@ -139,18 +135,18 @@ fn memory_check(memory: &BTreeMap<String, Memory>) -> Check {
 }
 
 /// Checks that every record reached the files, and that the log holds every frame that the rig counted.
-fn records(evidence: &SegmentFiles, outcome: &Outcome) -> Check {
+fn records(files: &SegmentFiles, outcome: &Outcome) -> Check {
     let mut broken = Vec::new();
-    for (name, report) in &evidence.reports {
+    for (name, report) in &files.reports {
         match report.records_dropped {
             Some(0) => {}
             Some(dropped) => broken.push(format!("{name}: {dropped} records did not reach the files")),
             None => broken.push(format!("{name} left no report")),
         }
     }
-    let mut counted = counts(evidence.summary.bus.sent_by_id.by_name());
-    counted.add_all(&counts(evidence.summary.bus.received_by_id.by_name()));
-    match &evidence.log {
+    let mut counted = counts(files.summary.bus.sent_by_id.by_name());
+    counted.add_all(&counts(files.summary.bus.received_by_id.by_name()));
+    match &files.log {
         Err(error) => broken.push(error.clone()),
         Ok(log) if broken.is_empty() => {
             let ids = log.frames.ids().chain(counted.ids()).filter(|id| log.frames.of(id) != counted.of(id));
@@ -174,9 +170,9 @@ fn records(evidence: &SegmentFiles, outcome: &Outcome) -> Check {
 const STALL_NS: u64 = 5_000_000;
 
 /// Why broken bounds on position errors do not count, if so.
-fn position_exemption(evidence: &SegmentFiles, judge: bool) -> Option<String> {
+fn position_exemption(files: &SegmentFiles, judge: bool) -> Option<String> {
     let late = |report: &ProcessReport| report.timing.stages.wakeup_ns.max;
-    let stall_ns = evidence.reports.values().filter_map(late).max().unwrap_or_default();
+    let stall_ns = files.reports.values().filter_map(late).max().unwrap_or_default();
     if !judge {
         Some("reported, not judged: --judge-positions no".into())
     } else if stall_ns >= STALL_NS {
@@ -187,15 +183,15 @@ fn position_exemption(evidence: &SegmentFiles, judge: bool) -> Option<String> {
 }
 
 /// Compares the position errors with the experiment's bounds; errors that the segment was too short for are not judged.
-fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
-    let drive = evidence.drive();
+fn positions(files: &SegmentFiles, judge: bool) -> Check {
+    let drive = files.drive();
     let errors_m = [
         drive.and_then(|drive| drive.position_error_dynamic_m),
         drive.and_then(|drive| drive.position_error_static_m),
     ];
     let reported = POSITIONS.into_iter().zip(errors_m);
     let measured: BTreeMap<_, _> = reported.filter_map(|(key, error_m)| Some((key, error_m?))).collect();
-    let experiment = evidence.run.experiment_toml.as_deref().unwrap_or_default().parse::<toml::Table>();
+    let experiment = files.run.experiment_toml.as_deref().unwrap_or_default().parse::<toml::Table>();
     let passed =
         experiment.ok().and_then(|table| table.get("passed")?.as_table().cloned()).unwrap_or_default();
     let bounds: toml::Table =
@@ -218,7 +214,7 @@ fn positions(evidence: &SegmentFiles, judge: bool) -> Check {
             if judged.values().all(|bound| bound.kept) {
                 return Check::new("positions", CheckResult::Passed, &reported.join("; "));
             }
-            let exemption = position_exemption(evidence, judge);
+            let exemption = position_exemption(files, judge);
             let result = if exemption.is_some() { CheckResult::Skipped } else { CheckResult::Failed };
             reported.extend(exemption);
             Check::new("positions", result, &reported.join("; "))
