@@ -138,12 +138,12 @@ fn check(answer: &Answer, controller: &AxisController) -> Result<(), TestCaseErr
 
 fn drive_through(
     mut controller: AxisController,
-    course: &[(Sensors, Stimulus)],
+    stimuli: &[(Sensors, Stimulus)],
     goes_along: bool,
 ) -> Result<(), TestCaseError> {
     let mut cycle = 0;
     let mut rig = Some(RigStatus { supply_pressure_pa: 7e5, linked: true, ..RigStatus::default() });
-    for (sensors, stimulus) in course {
+    for (sensors, stimulus) in stimuli {
         match stimulus {
             Stimulus::Nothing => {}
             Stimulus::Rig(status) => rig = Some(*status),
@@ -194,18 +194,18 @@ proptest! {
     fn a_position_axis_keeps_its_valve_in_range_and_shut_without_control(
         program in prop::sample::select(programs(Quantity::Position)),
         goes_along in any::<bool>(),
-        course in prop::collection::vec((sensors(), stimulus()), 1..120),
+        stimuli in prop::collection::vec((sensors(), stimulus()), 1..120),
     ) {
-        drive_through(controller(Axis::Drive, &program), &course, goes_along)?;
+        drive_through(controller(Axis::Drive, &program), &stimuli, goes_along)?;
     }
 
     #[test]
     fn a_force_axis_keeps_its_valve_in_range_and_shut_without_control(
         program in prop::sample::select(programs(Quantity::Force)),
         goes_along in any::<bool>(),
-        course in prop::collection::vec((sensors(), stimulus()), 1..120),
+        stimuli in prop::collection::vec((sensors(), stimulus()), 1..120),
     ) {
-        drive_through(controller(Axis::Load, &program), &course, goes_along)?;
+        drive_through(controller(Axis::Load, &program), &stimuli, goes_along)?;
     }
 }
 

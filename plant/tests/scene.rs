@@ -14,7 +14,7 @@ fn refused(text: &str) -> SceneError {
 /// What a scene comes to.
 struct PlayedScene {
     /// Plant at the start of each cycle, with the scripted forces over it.
-    course: Vec<(State, HandForces)>,
+    samples: Vec<(State, HandForces)>,
     reported: Vec<(u64, Outcome)>,
     plant: Plant,
 }
@@ -23,15 +23,15 @@ struct PlayedScene {
 fn play(scene: &Scene, cycles: u64, valve: impl Fn(u64) -> [f64; 2]) -> PlayedScene {
     let mut plant = Plant::new(&RigParameters::baseline(), &scene.setup()).expect("a checked setup");
     let mut people = People::new(scene);
-    let (mut course, mut reported) = (Vec::new(), Vec::new());
+    let (mut samples, mut reported) = (Vec::new(), Vec::new());
     for cycle in 0..cycles {
         let forces = people.begin_cycle(cycle, &mut plant, |outcome| reported.push((cycle, outcome)));
-        course.push((*plant.state(), forces));
+        samples.push((*plant.state(), forces));
         let mut inputs = Inputs { valve: valve(cycle), ..Inputs::default() };
         forces.put_into(&mut inputs);
         plant.step(&inputs);
     }
-    PlayedScene { course, reported, plant }
+    PlayedScene { samples, reported, plant }
 }
 
 fn shut(_: u64) -> [f64; 2] {
@@ -51,7 +51,7 @@ fn an_event_at_a_position_waits_for_the_carriage_from_its_time_on() {
         panic!("{:?}", played.reported)
     };
     assert_eq!(played.reported[0], (100, Outcome::Weights { added_mass_kg: 5.0 }), "nothing waits for it");
-    let place_m = |cycle: u64| played.course[cycle as usize].0.axes[0].extension_m;
+    let place_m = |cycle: u64| played.samples[cycle as usize].0.axes[0].extension_m;
     assert!(place_m(cycle - 1) < 0.2 && place_m(cycle) >= 0.2, "{cycle}");
     // Beyond the place already: it is passed on the way back, and here there is none.
     let late = text.replace("0.05", "0.5");
@@ -148,7 +148,7 @@ fn a_push_ramps_in_and_out_and_acts_on_its_part_alone() {
     let scene =
         scene("[[rig.hand]]\non = \"carriage\"\nfrom_s = 0.1\nto_s = 0.3\nforce_n = 30\nramp_s = 0.05\n");
     let played = play(&scene, 400, shut);
-    let force = |ms: usize| played.course[ms].1;
+    let force = |ms: usize| played.samples[ms].1;
     for (ms, expected_n) in
         [(99, 0.0), (100, 0.0), (125, 15.0), (150, 30.0), (249, 30.0), (275, 15.0), (300, 0.0)]
     {
@@ -162,7 +162,7 @@ fn a_push_ramps_in_and_out_and_acts_on_its_part_alone() {
 fn hands_that_act_at_a_time_add_up() {
     let hand = "[[rig.hand]]\non = \"load-eye\"\nfrom_s = 0\nto_s = 1\nramp_s = 0\nforce_n = ";
     let played = play(&scene(&format!("{hand}10\n{hand}-25\n")), 10, shut);
-    assert_eq!(played.course[5].1, HandForces { carriage_n: 0.0, load_eye_n: -15.0 });
+    assert_eq!(played.samples[5].1, HandForces { carriage_n: 0.0, load_eye_n: -15.0 });
 }
 
 const GUIDED: &str = "[rig]\ncarriage_position_m = 0.25\n[[rig.hand]]\non = \"carriage\"\nfrom_s = 0.1\n\
@@ -171,12 +171,12 @@ const GUIDED: &str = "[rig]\ncarriage_position_m = 0.25\n[[rig.hand]]\non = \"ca
 #[test]
 fn a_guiding_hand_brings_a_part_to_its_target_and_never_pulls_harder_than_it_can() {
     let played = play(&scene(GUIDED), 6000, shut);
-    let most_n = played.course.iter().map(|(_, force)| force.carriage_n.abs()).fold(0.0, f64::max);
+    let most_n = played.samples.iter().map(|(_, force)| force.carriage_n.abs()).fold(0.0, f64::max);
     assert!(most_n > 30.0 && most_n <= 150.0, "{most_n} N");
     let x_m = played.plant.state().axes[0].extension_m;
     // It stops where k (x_target - x) is friction (35 N) and the trapped air's spring: 4.5 kN/m over 1 cm, 45 N; over 20 kN/m.
     assert!((x_m - 0.26).abs() < 80.0 / 20_000.0, "{x_m} m");
-    let beyond = played.course.iter().map(|(state, _)| state.axes[0].extension_m).fold(0.0, f64::max);
+    let beyond = played.samples.iter().map(|(state, _)| state.axes[0].extension_m).fold(0.0, f64::max);
     assert!(beyond < 0.2601, "it does not overshoot: {beyond} m");
 }
 
@@ -186,13 +186,13 @@ fn trapped_air_holds_a_part_against_the_hand_at_its_limit() {
         "[rig]\ncarriage_position_m = 0.25\n[[rig.hand]]\non = \"carriage\"\nfrom_s = 0\nto_s = 4\nguide_to_m = 0.4\n",
     );
     let played = play(&scene, 4000, shut);
-    let (state, force) = played.course[3999];
+    let (state, force) = played.samples[3999];
     let most_n = GuidingArm::default().most_n;
     assert_eq!(force.carriage_n, most_n);
     let x_m = state.axes[0].extension_m;
     // Air springs of both chambers, p A^2 / V each: some 4.5 kN/m, against 150 N less friction of 26 N: 28 mm.
     assert!((0.265..0.29).contains(&x_m), "{x_m} m");
-    let held = played.course.iter().all(|(_, force)| force.carriage_n.abs() <= most_n);
+    let held = played.samples.iter().all(|(_, force)| force.carriage_n.abs() <= most_n);
     assert!(held);
 }
 
@@ -201,12 +201,12 @@ fn a_hand_starts_from_where_the_part_is_when_it_is_put_on() {
     let text = "[rig]\n[[rig.hand]]\non = \"load-eye\"\nfrom_s = 1.0\nto_s = 2.0\nguide_to_m = 0.2\n";
     // The load comes out until then.
     let played = play(&scene(text), 2000, |cycle| [0.0, if cycle < 600 { 0.3 } else { 0.0 }]);
-    let (before, at) = (played.course[999].1, played.course[1000]);
+    let (before, at) = (played.samples[999].1, played.samples[1000]);
     assert_eq!(before, HandForces::default());
     assert!(eye_m(&at.0) < 0.45, "{} m", eye_m(&at.0));
     // The target stands on the part: what is left is the damping of 60 N s/m at the speed with which it still comes out.
     assert_eq!(at.1.load_eye_n, 60.0 * at.0.axes[1].rod_velocity_m_per_s);
-    assert!(played.course[1600].1.load_eye_n < 0.0, "it pulls towards 0.2 m");
+    assert!(played.samples[1600].1.load_eye_n < 0.0, "it pulls towards 0.2 m");
 }
 
 // Buttons and pin.
@@ -226,7 +226,7 @@ fn events_act_in_their_cycle_in_the_order_of_their_times() {
         (300, Outcome::Released),
     ];
     assert_eq!(played.reported, expected);
-    let stopped = |ms: usize| played.course[ms].0.emergency_stop;
+    let stopped = |ms: usize| played.samples[ms].0.emergency_stop;
     assert_eq!([99, 100, 299, 300].map(stopped), [false, true, true, false]);
 }
 
@@ -242,7 +242,7 @@ fn passing(until_s: f64) -> PlayedScene {
 fn a_link_is_tried_until_the_eye_passes_the_gap() {
     let played = passing(3.9);
     let [(cycle, Outcome::Linked)] = played.reported[..] else { panic!("{:?}", played.reported) };
-    let (state, _) = &played.course[cycle as usize];
+    let (state, _) = &played.samples[cycle as usize];
     let distance_m = eye_m(state) - state.axes[0].extension_m;
     assert!(cycle > 300 && distance_m.abs() <= 1e-4, "linked in cycle {cycle} at {distance_m} m");
     assert!(played.plant.linked());
@@ -303,5 +303,5 @@ fn a_scene_played_twice_is_equal_to_the_bit() {
     let valve = |cycle: u64| [0.0, if cycle > 2000 { 0.2 } else { 0.0 }];
     let [one, other] = [(); 2].map(|()| play(&scene(&text), 4000, valve));
     assert_eq!(one.reported, other.reported);
-    assert_eq!(one.course, other.course);
+    assert_eq!(one.samples, other.samples);
 }

@@ -1,4 +1,4 @@
-//! Table: a course of its own from a CSV file, linear or smooth between its points.
+//! Table: a trajectory from a CSV file, linear or smooth between its points.
 //!
 //! ```text
 //!   time_s,position_m        or time_s,force_N; other columns are passed over, lines that begin with # too
@@ -20,7 +20,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 pub(super) const KIND: Kind =
-    Kind { name: "table", about: "a course of its own, from a CSV file", serves: BOTH, read };
+    Kind { name: "table", about: "a trajectory from a CSV file", serves: BOTH, read };
 
 const TIME: &str = "time_s";
 /// The columns of values, and what they are.

@@ -151,9 +151,9 @@ fn the_same_file_gives_the_same_steps() {
     let law = "law = 'pseudo-random-steps'; amplitude_m = 0.1; hold_s = 0.05; duration_s = 5; levels = 5";
     let [one, same, other] =
         [law.to_owned(), law.to_owned(), format!("{law}; seed = 2")].map(|law| motion(&law));
-    let course =
+    let trajectory =
         |motion: &Motion| (0..5000).map(|cycle| motion.at(f64::from(cycle) * 1e-3)).collect::<Vec<_>>();
-    assert_eq!(course(&one), course(&same));
-    assert_ne!(course(&one), course(&other));
+    assert_eq!(trajectory(&one), trajectory(&same));
+    assert_ne!(trajectory(&one), trajectory(&other));
     assert_eq!(one.end_m(), 0.2);
 }

@@ -118,7 +118,7 @@ impl Add for HandForces {
     }
 }
 
-/// A hand in the course of a run.
+/// State of a hand during a run.
 #[derive(Debug, Clone)]
 pub(super) struct ActiveHand {
     hand: Hand,

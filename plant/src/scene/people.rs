@@ -12,7 +12,7 @@ use super::stop::{RigCall, StopHolder, StopHolders};
 use super::{Action, Event, HandForces, Scene, cycle_of};
 use crate::plant::Plant;
 
-/// A scene in its course: forces and actions of each cycle, not yet done to any plant.
+/// State of a scene during a run: forces and actions of each cycle, not yet applied to any plant.
 #[derive(Debug, Clone)]
 pub struct Script {
     hands: Vec<ActiveHand>,
