@@ -143,7 +143,7 @@ impl Group {
 
     fn step(&mut self, registers: Registers, plants: &mut [Plant], inputs: &[Inputs]) {
         if self.stale {
-            self.seat(registers, plants);
+            self.assign_lanes(registers, plants);
         }
         if let Some(first) = self.in_lanes.iter().position(|in_lane| *in_lane) {
             self.load(first, plants, inputs);
@@ -160,8 +160,8 @@ impl Group {
         }
     }
 
-    /// Looks who runs in lanes, and takes over their laws; a lane without a rig is a shadow of the first that has one.
-    fn seat(&mut self, registers: Registers, plants: &[Plant]) {
+    /// Assigns the plants with baseline laws to lanes and copies their laws; an unused lane repeats the first of them.
+    fn assign_lanes(&mut self, registers: Registers, plants: &[Plant]) {
         self.stale = false;
         self.in_lanes = [false; WIDTH];
         let Some(first) = plants.iter().find(|plant| plant.is_baseline()) else { return };
@@ -175,7 +175,7 @@ impl Group {
         }
         for (lane, in_lane) in self.in_lanes.iter().enumerate() {
             let plant = if *in_lane { &plants[lane] } else { first };
-            self.fixed.seat(lane, &plant.integrator);
+            self.fixed.set_laws(lane, &plant.integrator);
         }
     }
 

@@ -44,8 +44,8 @@ impl HeldColumns {
         Box::new(HeldColumns { constants: [none; CONSTANTS], command, hand, stopped: none, linked: none })
     }
 
-    /// Takes over the laws of a rig.
-    pub(super) fn seat(&mut self, lane: usize, of: &Integrator) {
+    /// Copies the laws of a rig into a lane.
+    pub(super) fn set_laws(&mut self, lane: usize, of: &Integrator) {
         let mut writing = Writing { columns: &mut self.constants, lane, next: 0 };
         of.formed(&mut writing);
         debug_assert_eq!(writing.next, CONSTANTS);
