@@ -228,7 +228,7 @@ impl<'a> Observer<'a> {
                 let mut plant = plant_in(rig, &base.starts[window]);
                 plant
                     .go_on_in(&state_at(&plant, &points, [true; 2]))
-                    .expect("a nudge leaves the rig in a state of its own");
+                    .expect("a perturbation leaves the rig in a state of its own");
                 let (mut perturbed, mut jumps) = (Vec::with_capacity(self.rows()), Vec::new());
                 self.read(&mut plant, window, &mut perturbed, &mut jumps);
                 out.iter_mut().zip(&jumps).for_each(|(all, jump)| *all |= jump);

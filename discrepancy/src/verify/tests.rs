@@ -170,7 +170,7 @@ fn a_law_over_time_goes_on_in_the_time_of_the_whole_record_where_a_part_is_searc
 }
 
 #[test]
-fn start_states_of_axes_that_do_not_act_on_each_other_are_nudged_together() {
+fn start_states_of_axes_that_do_not_act_on_each_other_are_perturbed_together() {
     let rig = RigParameters::baseline();
     let mut record = record(&rig, &rig, 6);
     // The load does what the drive does.

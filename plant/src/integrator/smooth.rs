@@ -98,8 +98,8 @@ impl<P: Axes> Integrator<P> {
 
         let growth =
             self.chambers.force_growth(&span.lag, middle.per_volume, [from.air_a.flow, from.air_b.flow]);
-        let nudged_n = if held.linked && moving.any() { BREAK_AWAY_MARGIN_N } else { 0.0 };
-        let margin = growth.abs() + P::both(nudged_n);
+        let margin_n = if held.linked && moving.any() { BREAK_AWAY_MARGIN_N } else { 0.0 };
+        let margin = growth.abs() + P::both(margin_n);
         let break_away = laws.break_away(step, &middle, force);
         let leaves = !moving & self.motion.might_leave(from.extension, force, margin, break_away);
         let turns = moving & (velocity * from.velocity).at_most(zero);

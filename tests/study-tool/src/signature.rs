@@ -201,7 +201,7 @@ impl Observer {
                 let mut plant = self.plant(&self.trajectory.rig, start);
                 plant
                     .go_on_in(&at_true_state(&plant, &points))
-                    .expect("a nudge leaves the rig in a state of its own");
+                    .expect("a perturbation leaves the rig in a state of its own");
                 let mut perturbed = Run::default();
                 self.read(&mut plant, window, &mut perturbed);
                 sensitivities.extend(
