@@ -27,7 +27,7 @@ mod laws;
 
 use crate::algorithm::Kind;
 
-/// All of them.
+/// The algorithms that a program file can name.
 pub const SHIPPED: &[Kind] = &[
     position_p::KIND,
     position_cascade::KIND,

@@ -9,12 +9,11 @@ use std::path::PathBuf;
 #[derive(Parser, Debug)]
 #[command(version, after_help = EXIT_CODE_HELP)]
 pub struct Cli {
-    /// What to do.
     #[command(subcommand)]
     pub(crate) command: Command,
 }
 
-/// What to do.
+/// What can be done with a campaign.
 #[derive(Subcommand, Debug)]
 pub(crate) enum Command {
     /// Print the number of runs and the values of the first ones; runs nothing.

@@ -19,7 +19,6 @@ const DEFAULT_FLIGHT_LATE_US: u64 = 500;
 #[derive(Debug, Parser)]
 #[command(name = "emulator", version, about, after_help = EXIT_CODE_HELP)]
 pub struct Cli {
-    /// What to do.
     #[command(subcommand)]
     pub(crate) command: Command,
 }

@@ -7,13 +7,13 @@ pub struct TopFigure {
     pub name: &'static str,
     /// Its unit; 1 for a count.
     pub unit: &'static str,
-    /// What it is of.
+    /// Group that it belongs to.
     pub kind: Kind,
     /// Whether runs are compared by it too.
     pub is_compared: bool,
 }
 
-/// What a figure at the top is of.
+/// Group of a figure at the top.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The drive's motion; a rehearsal has it too.
@@ -39,7 +39,7 @@ const fn count(name: &'static str) -> TopFigure {
 /// Those of the drive's motion.
 pub const POSITIONS: [&str; 2] = ["position_error_dynamic_m", "position_error_static_m"];
 
-/// All of them.
+/// The figures at the top, in the order in which they are listed.
 pub const TOP: [TopFigure; 16] = [
     position(POSITIONS[0]),
     position(POSITIONS[1]),

@@ -9,7 +9,6 @@ use std::path::PathBuf;
 #[derive(Debug, Parser)]
 #[command(name = "airbench", version, about, after_help = EXIT_CODE_HELP)]
 pub(crate) struct Cli {
-    /// What to do.
     #[command(subcommand)]
     pub(crate) command: Command,
 }

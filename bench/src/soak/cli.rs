@@ -83,9 +83,9 @@ pub(crate) struct ChildArguments {
 /// A switch whose both sides have a name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum YesNo {
-    /// On.
+    #[value(help = "On")]
     Yes,
-    /// Off.
+    #[value(help = "Off")]
     No,
 }
 

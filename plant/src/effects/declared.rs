@@ -85,7 +85,7 @@ pub enum Target {
 }
 
 impl Target {
-    /// All of them.
+    /// The places that a term may act on.
     pub const ALL: [Target; 7] = [
         Target::Force,
         Target::FlowA,

@@ -46,7 +46,7 @@ pub enum Balance {
 }
 
 impl Balance {
-    /// All of them.
+    /// The balances of an axis.
     pub const ALL: [Balance; 3] = [Balance::Force, Balance::FlowA, Balance::FlowB];
 
     /// As in `drive.force`.
@@ -111,7 +111,7 @@ pub enum Variable {
 }
 
 impl Variable {
-    /// All of them.
+    /// The variables that a table may be over.
     #[rustfmt::skip] // one line
     pub const ALL: [Variable; 9] = [
         Variable::Extension, Variable::Velocity, Variable::Speed, Variable::Direction,

@@ -26,22 +26,28 @@ pub(super) const PURPOSE: Rule = Rule {
     good: &[("a.rs", "//! Prints.\n"), ("a.toml", "")],
 };
 
+/// Whole comments that say nothing of what they stand at.
+const FILLERS: [&str; 5] = ["What to do.", "What it is of.", "All of them.", "On.", "Off."];
+
 /// A comment says what the name does not: an article and one word repeat it, or say nothing.
 pub(super) const SAYING_COMMENTS: Rule = Rule {
     name: "saying-comments",
     applies: is_rust,
     check: |file| {
         file.each_line(|line| {
-            let words: Vec<&str> = line.trim_start().strip_prefix("/// ")?.split(' ').collect();
-            let says_nothing = matches!(words[..], ["The" | "A" | "An" | "Its", word] if word.ends_with('.'));
-            says_nothing.then(|| "say unit, shape or source, or strike the comment".to_owned())
+            let comment = line.trim_start().strip_prefix("/// ")?;
+            let words: Vec<&str> = comment.split(' ').collect();
+            let repeats_name = matches!(words[..], ["The" | "A" | "An" | "Its", word] if word.ends_with('.'));
+            (repeats_name || FILLERS.contains(&comment))
+                .then(|| "say unit, shape or source, or strike the comment".to_owned())
         })
     },
     bad: &[
         ("a.rs", "/// The file.\npub struct Report;\n", 1),
         ("a.rs", "struct A {\n    /// Its name.\n    name: u8,\n", 2),
+        ("a.rs", "/// All of them.\nconst ALL: [u8; 2] = [1, 2];\n", 1),
     ],
-    good: &[("a.rs", "/// The file as given.\n/// Its name, cut.\n// The file.\n")],
+    good: &[("a.rs", "/// All of them, sorted.\n/// The file as given.\n/// Its name, cut.\n// The file.\n")],
 };
 
 /// What the crate of each folder may depend on, after the packages that not everybody may know.
