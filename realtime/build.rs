@@ -1,4 +1,4 @@
-//! Tells the crate what it is built with, so that a run's record can say it: compiler, target, profile.
+//! Passes to the crate what it is built with, so that a run's record can say it: compiler, target, profile.
 //!
 //! Not from which commit: all crates would be built anew after each one. That is reported by the program that writes the record.
 
@@ -7,13 +7,13 @@ use std::process::Command;
 fn main() {
     println!("cargo::rerun-if-changed=build.rs");
     let rustc = std::env::var("RUSTC").unwrap_or_else(|_| "rustc".to_owned());
-    tell("RUSTC", answer(&rustc, &["--version"]));
+    set_env("RUSTC", answer(&rustc, &["--version"]));
     for (name, variable) in [("TARGET", "TARGET"), ("PROFILE", "PROFILE"), ("OPT_LEVEL", "OPT_LEVEL")] {
-        tell(name, std::env::var(variable).ok());
+        set_env(name, std::env::var(variable).ok());
     }
 }
 
-fn tell(name: &str, value: Option<String>) {
+fn set_env(name: &str, value: Option<String>) {
     println!("cargo::rustc-env=AIRBENCH_BUILD_{name}={}", value.as_deref().unwrap_or("unknown"));
 }
 

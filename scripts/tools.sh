@@ -104,7 +104,7 @@ install_compiler() {
         { command -v g++ >/dev/null || need_packages g++; } && need_program make make
 }
 
-# Tells which files a program touches.
+# Prints which files a program touches.
 install_strace() { need_program strace strace libunwind8; }
 
 # Programs of SocketCAN that `bench can` runs, and the one that python-can asks for interfaces.

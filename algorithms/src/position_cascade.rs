@@ -20,7 +20,7 @@
 //!
 //! The force's rate is F' = c (v - x'), v being what the valve does (see [`crate::linearisation`], whose
 //! pressure-compensated law it wants): v is therefore the wanted speed and, over c, the wanted rate of the force. The force
-//! sensor tells the load; it also reads the mass behind it, which its low-pass (force_filter_hz of the pre-controller, 5
+//! sensor measures the load; it also reads the mass behind it, which its low-pass (force_filter_hz of the pre-controller, 5
 //! Hz) keeps out of the loop.
 //!
 //! The integral part stands still at its limit, while the error is larger than its zone, and while the valve cannot follow,

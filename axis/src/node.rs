@@ -341,7 +341,7 @@ impl<P: CalibrationPort> ControllerNode<P> {
         }
     }
 
-    /// Tells a person something; a full queue loses it, which a person survives.
+    /// Queues a message for people; a full queue loses it.
     pub fn report(&mut self, news: NodeEvent) {
         let _ = self.queues.news.try_send(news);
     }

@@ -230,7 +230,7 @@ pub struct Registers {
 }
 
 impl Registers {
-    /// Those of `tape`; `is_active` tells of a leaf whether it has derivatives.
+    /// Those of `tape`; `is_active` is whether a leaf has derivatives.
     pub fn new(tape: &Tape, directions: usize, is_active: impl Fn(Register) -> bool) -> Self {
         let (leaves, count) = (tape.leaves.count(), tape.registers());
         let mut values = vec![0.0; count];

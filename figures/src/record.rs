@@ -103,7 +103,7 @@ impl Record {
     }
 
     /// The run cut into its repetitions, the way to each included. One that the end of the run cut short is left out unless
-    /// there is no other; a run that tells no states is one repetition.
+    /// there is no other; a run without recorded states is one repetition.
     pub fn repetitions(&self) -> Vec<Span> {
         let states = self.leader().states("main_chain");
         let is_last = |entry: &StateSpan| entry.state == "final-settling";

@@ -300,7 +300,7 @@ mod tests {
     use super::*;
     use protocol::frames::ValveCommand;
 
-    /// Of both axes; the position tells the cycle, in mm.
+    /// Of both axes; the position is the cycle, in mm.
     fn sensors(cycle: u64) -> [CanFrame; 2] {
         let (position_m, force_n, pressure_a_pa, pressure_b_pa) = (cycle as f64 * 1e-3, 0.0, 1e5, 1e5);
         let alive = (cycle % ALIVE_RANGE) as u8;
@@ -313,7 +313,7 @@ mod tests {
         Frame::Tick(tick).encode().unwrap()
     }
 
-    /// Cycles of which those in `without` have no sensors; ticks tell `skipped` of them as skipped.
+    /// Cycles of which those in `without` have no sensors; ticks report `skipped` of them as skipped.
     fn wire(cycles: u64, without: &[u64], skipped: u16) -> Wire {
         let mut wire = Wire::default();
         for cycle in 100..100 + cycles {

@@ -22,7 +22,7 @@
 //! | `effects.rs` | what the baseline leaves out; friction with effects: `effects/friction.rs` |
 //! | `tables.rs` | rows of the measurement file and of the true states |
 //!
-//! [`scene`] is what people do to it: setup, hands, emergency stop, linkage and weights, as an experiment file tells.
+//! [`scene`] is what people do to it: setup, hands, emergency stop, linkage and weights, as an experiment file declares it.
 //!
 //! ```
 //! use plant::{Inputs, Plant, RigParameters, Sensors, Setup};

@@ -29,7 +29,7 @@ pub struct CycleRecord {
 /// Columns of `measurement.csv` after `time_s`, for one axis; each is prefixed with `drive_` or `load_`.
 pub const AXIS_COLUMNS: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
 
-/// Writes the head of `measurement.csv`, whose comment line tells how the rig was set up.
+/// Writes the head of `measurement.csv`, whose comment line says how the rig was set up.
 ///
 /// # Errors
 /// What `out` says.

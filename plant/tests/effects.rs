@@ -24,7 +24,7 @@ fn inputs(k: u32) -> Inputs {
     }
 }
 
-/// Runs a rig and tells the first instant at which it is no rig any more.
+/// Runs a rig and returns the first instant at which it is no rig any more.
 fn survives(rig: &RigParameters, linked: bool) -> Result<Plant, String> {
     let setup = Setup { carriage_position_m: 0.3, linked, added_mass_kg: 0.0 };
     let mut plant = Plant::new(rig, &setup).expect("a good setup");

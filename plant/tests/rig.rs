@@ -1,4 +1,4 @@
-//! The rig's behaviour as rig-model.md tells it: start, ends of the stroke, linkage, emergency stop.
+//! The rig's behaviour as rig-model.md specifies it: start, ends of the stroke, linkage, emergency stop.
 
 use plant::{Axis, Inputs, LinkRefused, Plant, RigParameters, Setup, SetupError, State};
 

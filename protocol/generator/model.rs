@@ -15,7 +15,7 @@ use can_dbc::{
 
 use crate::source::Source;
 
-/// Leading words that tell senders or axes apart.
+/// Leading words that distinguish senders or axes.
 const NODE_WORDS: [&str; 4] = ["Drive", "Load", "Console", "Rig"];
 /// Identifiers of CANopen and diagnostics.
 const FOREIGN_IDS: [(u16, u16); 5] =
@@ -302,7 +302,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Takes the checksum out of the signals and tells where it stands.
+    /// Takes the checksum out of the signals and returns its place.
     fn checksum(
         &self,
         message: &can_dbc::Message,

@@ -1,6 +1,6 @@
 //! The text of a DBC file and where in it things stand, so that every refusal can name file and line.
 //!
-//! `can-dbc` tells the place of a syntax error only; messages and signals are looked up again in the text here. That also
+//! `can-dbc` reports the place of a syntax error only; messages and signals are looked up again in the text here. That also
 //! catches an identifier beyond 16 bits, which `can-dbc` 10 cuts short without a word.
 
 use can_dbc::{Dbc, DbcError};

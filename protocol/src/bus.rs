@@ -41,7 +41,7 @@ pub use wire::{Frames, WireFault, WireNode, WireOrder, WireOrders};
 
 /// The clock that stamps frames: the time of what happened so many ns ago, in ns since an epoch of the caller's choice.
 ///
-/// A real clock subtracts the age that the kernel tells of an arrival; a simulated one, for which no time passes between
+/// A real clock subtracts the age that the kernel reports of an arrival; a simulated one, for which no time passes between
 /// arrival and reading, ignores it.
 pub type StampClock = Box<dyn Fn(u64) -> u64 + Send>;
 
@@ -134,7 +134,7 @@ pub struct BusCounters {
 
 /// A destination of frames.
 pub trait FrameSink {
-    /// Puts a frame on the bus and tells when it was handed over, in ns of the bus's clock.
+    /// Puts a frame on the bus and returns when it was handed over, in ns of the bus's clock.
     ///
     /// # Errors
     /// [`SendError`] when the frame was dropped; it is counted and never queued for later, since a command that
@@ -163,7 +163,7 @@ pub trait Bus: FrameSink + Send {
     /// [`BusError::NoBarrier`] on `can://`.
     fn join_lockstep(&mut self, role: control::Role, name: &str) -> Result<(), BusError>;
 
-    /// Tells the barrier that this member has posted its frames of `cycle`.
+    /// Reports to the barrier that this member has posted its frames of `cycle`.
     fn done(&mut self, cycle: u32);
 
     /// Refuses what arrives from now on; frames that arrived before can still be received, then [`Received::Nothing`] follows.

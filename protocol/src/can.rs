@@ -107,7 +107,7 @@ impl fmt::Display for CanFrame {
             write!(f, "{:03X}#", self.can_id & STANDARD_MASK)?;
         }
         if self.can_id & REMOTE_FLAG != 0 {
-            // A request carries no data, but may tell how much it asks for.
+            // A request carries no data, but may say how much it asks for.
             return if self.len == 0 { write!(f, "R") } else { write!(f, "R{}", self.len) };
         }
         self.data().iter().try_for_each(|byte| write!(f, "{byte:02X}"))

@@ -1,4 +1,4 @@
-//! Takes the valve commands of one axis from the bus and tells which opening acts.
+//! Takes the valve commands of one axis from the bus and decides which opening acts.
 //!
 //! [`CommandIntake::take`] stores a command when it arrives; it acts from the start of the next cycle (bus.md, Time). There
 //! [`CommandIntake::latch`] drops one that has grown older than 20 cycles, and notes whether two senders dispute the valve;
@@ -25,7 +25,7 @@ pub struct CommandCounters {
     pub expired: u64,
     /// Commands that never came, by the gaps in the sender's counter.
     pub lost: u64,
-    /// Times that the sender's counter jumped further than cycles had passed: what was lost there, it does not tell.
+    /// Times that the sender's counter jumped further than cycles had passed: what was lost there is unknown.
     pub breaks: u64,
     /// Accepted commands that came a cycle or more later than the cycle after the one that they answer.
     pub late: u64,

@@ -1,4 +1,4 @@
-//! What a program tells the shell that started it: one table for all programs of airbench (programs.md).
+//! Exit codes of the programs, for the shell that started them: one table for all programs of airbench (programs.md).
 
 use std::process::ExitCode;
 

@@ -63,7 +63,7 @@ impl TwoSenderDetector {
                 // A frame may come late into the next cycle, so one more than the cycles that passed.
                 let allowed = passed + 1;
                 match ahead {
-                    // Sixteen lost frames look like none; the cycles that passed tell them apart.
+                    // Sixteen lost frames look like none; the cycles that passed distinguish them.
                     0 if passed >= ALIVE_RANGE => Step::Continues { lost: ALIVE_RANGE - 1 },
                     1.. if ahead <= allowed => Step::Continues { lost: ahead - 1 },
                     _ => Step::Breaks,

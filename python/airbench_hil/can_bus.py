@@ -78,7 +78,7 @@ class AirbenchBus(can.BusABC):
             threading.Thread(target=self._keep_alive, daemon=True).start()
 
     def fileno(self) -> int:
-        """A descriptor that is readable when a frame waits; that of a member would not tell of frames that were put by."""
+        """A descriptor that is readable when a frame waits; that of a member would not show frames that were put by."""
         if self._member:
             raise NotImplementedError("a member of the barrier has no descriptor to wait on")
         return self._peer.fileno()

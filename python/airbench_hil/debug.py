@@ -123,7 +123,7 @@ class DebugCore(core.Core):
         return int.from_bytes(bytes(self.machine.read_memory(address, 4)), "little")
 
     def close(self) -> None:
-        """Tells the debugger that the program has ended."""
+        """Reports to the debugger that the program has ended."""
         self.server.close()
 
 

@@ -51,7 +51,7 @@ class Guard:
         self.buffer = b""
 
     def say(self, words: Dict[str, Any]) -> None:
-        """Tells the one who asked, if he is still there."""
+        """Answers the one who asked, if he is still there."""
         try:
             self.control.sendall(json.dumps(words).encode() + b"\n")
         except OSError:
@@ -191,7 +191,7 @@ def main() -> None:
     except ProcessLookupError:
         ended.append(1)
     except (OSError, AttributeError):
-        pass  # a kernel before 5.3, or one that forbids it: the closed socket tells
+        pass  # a kernel before 5.3, or one that forbids it: the closed socket shows it
     while not ended:
         for at, _ in poll.poll():
             if at == wake_read:

@@ -1,4 +1,4 @@
-"""When a program under `bench can` is ready: nobody on the bus can tell, since its connection is made before it starts.
+"""When a program under `bench can` is ready: nobody on the bus can know, since its connection is made before it starts.
 
 In lockstep the barrier begins when all are connected, and who was not there for the first cycle's sensors never answers them. So its
 system calls are looked at (/proc/PID/task/*/syscall): a program of which a thread waits for input has opened what it waits on.

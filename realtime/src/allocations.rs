@@ -6,7 +6,7 @@
 //! has warmed up, and [`counted`] must then stay 0.
 //!
 //! A freed block counts too: giving memory back takes the same locks. Without the registration nothing is counted and
-//! [`counted`] is 0, which then proves nothing; [`is_registered`] tells the two apart.
+//! [`counted`] is 0, which then proves nothing; [`is_registered`] distinguishes the two.
 //!
 //! # Source
 //! The contract of `std::alloc::GlobalAlloc`: an allocator must not unwind and must not allocate through itself.

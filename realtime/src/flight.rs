@@ -279,7 +279,7 @@ impl<R: Stamped, F: Stamped> FlightRecorder<R, F> {
             return DumpSlot::Free;
         }
         self.dropped += 1;
-        // Of equals the newest goes: what began a trouble tells more than its hundredth repetition.
+        // Of equals the newest goes: what began a trouble says more than its hundredth repetition.
         let least = self.kept.iter().enumerate().rev().min_by_key(|(_, kept)| kept.severity.rank());
         match least.map(|(place, kept)| (place, kept.severity)) {
             Some((place, severity)) if severity.rank() < trigger.severity.rank() => {

@@ -28,7 +28,7 @@ use crate::deflate::DeflateSerializer;
 
 pub use hdrhistogram::Histogram;
 
-/// The largest value that a recorder tells apart, 60 s: a loop that stalls longer has stopped.
+/// The largest value that a recorder distinguishes, 60 s: a loop that stalls longer has stopped.
 pub const BOUND_NS: u64 = 60_000_000_000;
 
 const SIGNIFICANT_DIGITS: u8 = 3;
@@ -117,7 +117,7 @@ pub struct Percentiles {
     pub p99: Option<u64>,
     /// 99.9 % of the samples were at most this.
     pub p999: Option<u64>,
-    /// 99.99 % of the samples were at most this; below 10 000 samples it is the largest one, as `count` tells.
+    /// 99.99 % of the samples were at most this; below 10 000 samples it is the largest one, see `count`.
     pub p9999: Option<u64>,
     /// No sample was above this (rounded up by at most 0.1 %, like the others).
     pub max: Option<u64>,

@@ -45,7 +45,7 @@ use crate::histogram::{BOUND_NS, Recorder};
 /// What happens when whole cycles were missed.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum OverrunPolicy {
-    /// Go on with the newest cycle that is due, and tell how many were skipped.
+    /// Go on with the newest cycle that is due, and report how many were skipped.
     CatchUp,
     /// End the loop with an [`Overrun`].
     Stop,
@@ -104,7 +104,7 @@ impl PeriodicConfig {
     }
 }
 
-/// The longest period, 60 s: what the histograms tell apart.
+/// The longest period, 60 s: what the histograms distinguish.
 const MOST_PERIOD: Duration = Duration::from_nanos(BOUND_NS);
 
 /// A loop cannot run with these numbers.
@@ -299,7 +299,7 @@ impl<C: Clock> PeriodicLoop<C> {
 /// only place where coordinated omission is undone.
 pub(crate) fn record_missed(wakeup_ns: &mut Recorder, late_ns: u64, skipped: u64, period_ns: u64) {
     // Cycles beyond the recorder's bound all land in one bin: recorded at one go, so that hours of stall (a debugger,
-    // a clock step) cost no more than the 60 s that the recorder tells apart.
+    // a clock step) cost no more than the 60 s that the recorder distinguishes.
     let clipped = (late_ns.saturating_sub(BOUND_NS).div_ceil(period_ns)).min(skipped);
     if clipped > 0 {
         wakeup_ns.record_n(late_ns, clipped);

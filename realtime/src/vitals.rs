@@ -35,7 +35,7 @@ pub struct VitalCounts {
     pub voluntary_switches: u64,
     /// Times another thread took the CPU from it.
     pub involuntary_switches: u64,
-    /// Time that the thread was ready to run and another one had the CPU, ns; 0 where the kernel does not tell.
+    /// Time that the thread was ready to run and another one had the CPU, ns; 0 where the kernel does not report it.
     pub run_delay_ns: u64,
     /// Times the process was continued after a stop (SIGCONT). The handler may run on another thread, so that the count may
     /// come a cycle later than the stall.

@@ -6,7 +6,7 @@ Nothing of airbench takes part: candump.log was written by can-utils and is deco
 
 - bus.log with candump.log: the same frames, for each identifier in the same order;
 - every DriveSensors and LoadSensors frame with the row of its cycle in measurement.csv, signal by signal;
-- every row without a frame with the skipped cycles that ticks and summary.json tell;
+- every row without a frame with the skipped cycles that ticks and summary.json report;
 - the valve columns with the commands of bus.log by their stamps, under the rules of the contract: the last command that
   arrived before cycle k was due acts in it, and one that answers a cycle more than 20 sent cycles back does not. Between the
   kernel's stamp and a socket a frame may be held up, when real-time threads leave the kernel's own no time: candump, which
@@ -32,7 +32,7 @@ AXES = {"DriveSensors": "drive", "LoadSensors": "load"}
 COMMANDS = {"DriveValveCommand": "drive", "LoadValveCommand": "load"}
 STALE_AFTER_CYCLES = 20
 CYCLE_NS = 1_000_000
-# The log truncates stamps to 1 us, and summary.json tells cycle 0 as a double of seconds since 1970, 0.24 us apart: a command
+# The log truncates stamps to 1 us, and summary.json holds cycle 0 as a double of seconds since 1970, 0.24 us apart: a command
 # this close to the moment when a cycle was due may have come before or after it.
 UNDECIDED_NS = 3000
 # How long after that a frame that was held up may have reached the rig.

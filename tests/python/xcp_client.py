@@ -118,7 +118,7 @@ class Client:
         return struct.unpack("<I", bytes(self.master.shortUpload(4, self.address(name))[:4]))[0]
 
     def write(self, address, data):
-        """Tells what the slave says: nothing, or the name of its refusal."""
+        """Returns what the slave says: nothing, or the name of its refusal."""
         try:
             self.master.setMta(address)
             for at in range(0, len(data), 6):

@@ -6,7 +6,7 @@
 use protocol::can::CanFrame;
 use protocol::frames::{Frame, Tick};
 
-/// What a trace tells of the sensor frames of one axis.
+/// What a trace shows of the sensor frames of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SensorAccount {
     /// Frames that the first tick says were sent by then, and that were not heard.

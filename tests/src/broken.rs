@@ -134,7 +134,7 @@ impl FaultRun {
         rows(&self.scene.path("emulator/faults.csv"))
     }
 
-    /// Holds that every log tells the same faults: table, summary, frames of the bench, and the count beside the truth.
+    /// Holds that every log reports the same faults: table, summary, frames of the bench, and the count beside the truth.
     pub fn expect_marks_in_every_log(&self) {
         let rows = self.rows();
         assert!(!rows.is_empty(), "a script without a mark");

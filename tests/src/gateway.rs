@@ -36,7 +36,7 @@ impl GatewayProcess {
         self.running.wait_for_times(text, times);
     }
 
-    /// The most memory that it ever had, KiB, as the kernel tells it.
+    /// The most memory that it ever had, KiB, as the kernel reports it.
     pub fn peak_memory_kib(&self) -> u64 {
         let path = format!("/proc/{}/status", self.running.number());
         let status = std::fs::read_to_string(path).expect("the gateway runs");

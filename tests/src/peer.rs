@@ -119,7 +119,7 @@ impl Peer {
                     act(self, control.cycle, &frames);
                     frames.clear();
                     let done = Control::new(Kind::Done, control.cycle).to_bytes();
-                    // The host may have gone since: the next receive tells.
+                    // The host may have gone since: the next receive shows it.
                     let _ = send(&self.socket, &done, SendFlags::NOSIGNAL);
                 }
                 Packet::Closed => return,

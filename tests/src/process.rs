@@ -233,7 +233,7 @@ impl CompletedProcess {
     }
 }
 
-/// Waits until `condition` holds; `what` tells what was waited for.
+/// Waits until `condition` holds; `what` names what was waited for.
 #[track_caller]
 pub fn wait_until(what: &str, mut condition: impl FnMut() -> bool) {
     let until = Instant::now() + PATIENCE;

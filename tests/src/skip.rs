@@ -3,7 +3,7 @@
 use std::fs::OpenOptions;
 use std::io::Write;
 
-/// Tells that the test `name` was skipped, and why; CI fails unless the name stands in `.ci/allowed-skips`.
+/// Reports that the test `name` was skipped, and why; CI fails unless the name stands in `.ci/allowed-skips`.
 pub fn report(name: &str, reason: &str) {
     eprintln!("SKIPPED {name}: {reason}");
     let Some(list) = std::env::var_os("AIRBENCH_SKIPS") else { return };

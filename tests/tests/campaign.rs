@@ -115,7 +115,7 @@ fn shards_in_any_order_and_number_give_the_same_bytes() {
     merge(&folders[..2]).expect_code(BAD_INPUT).expect_stderr(&["2 of 6 parts are missing", "part 2"]);
     let doubled = [&folders[..], &["whole"]].concat();
     merge(&doubled).expect_code(BAD_INPUT).expect_stderr(&["twice", "shard-0", "whole"]);
-    // An array of Slurm and an indexed job tell the index; both counts fill one folder.
+    // An array of Slurm and an indexed job give the index; both counts fill one folder.
     for (variable, index, count) in [("SLURM_ARRAY_TASK_ID", "0", "2"), ("JOB_COMPLETION_INDEX", "1", "2")] {
         let mut start = place.command("run", &["--out", "array", "--shard", count]);
         Running::start("campaign", start.env(variable, index)).wait().expect_code(GOOD);

@@ -262,7 +262,7 @@ fn each_way_of_breaking_the_contract_is_named_with_what_follows_from_it_and_noth
         (Fault::ComesBackWhileStopped, &["emergency-stop valve-shut"]),
         (Fault::IgnoresLoss, &["sensor-loss valve-shut"]),
         (Fault::CountsCyclesItself, &["sensor-loss no-invented-echo"]),
-        // Who is dead opens no valve: of a fault that kills a controller no other check would tell.
+        // Who is dead opens no valve: of a fault that kills a controller no other check would report.
         (Fault::DiesOfStop, &["emergency-stop to-the-end"]),
         (Fault::DiesOfLoss, &["sensor-loss to-the-end"]),
     ];
@@ -273,7 +273,7 @@ fn each_way_of_breaking_the_contract_is_named_with_what_follows_from_it_and_noth
     }
 }
 
-/// Nothing of what is left tells a process that has ended from a controller that keeps its valve shut.
+/// Nothing of what is left distinguishes a process that has ended from a controller that keeps its valve shut.
 #[test]
 fn a_process_that_has_ended_is_reported_in_every_session() {
     let (failed, ended) = broken(Fault::None, &["true"]);

@@ -143,7 +143,7 @@ fn a_controller_that_was_stopped_says_so_in_its_rows_and_freezes_its_recorder() 
     let rows = expect_one_account(&scene, process, "controller", "drive");
     let stopped =
         rows.iter().position(|row| row.skipped >= 25).expect("a row that skips the cycles of the stop");
-    // A cycle that was stopped in its midst tells it in its own row, before the one that skips; a handler that runs on another
+    // A cycle that was stopped in its midst reports it in its own row, before the one that skips; a handler that runs on another
     // thread, in a later one.
     let reported: Vec<_> = (0..rows.len()).filter(|row| rows[*row].vitals.continued > 0).collect();
     assert!(

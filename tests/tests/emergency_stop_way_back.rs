@@ -62,7 +62,7 @@ fn tripped(source: StopSource) -> Scene {
 }
 
 fn figures(scene: &Scene) -> Value {
-    // Its code tells of the run, which was stopped; its figures are what is wanted.
+    // Its code is that of the run, which was stopped; its figures are what is wanted.
     Program::Bench.start(&[&"summary", &scene.path("run")]).wait();
     json(&scene.path("run/summary.json"))
 }

@@ -19,7 +19,7 @@ fn run(change: &str) -> (Scene, AxisTable) {
     (scene, table)
 }
 
-/// Wanted velocity over control error, where the error is large enough to tell.
+/// Wanted velocity over control error, where the error is large enough to measure it.
 fn gains(table: &AxisTable, rows: std::ops::Range<usize>) -> Vec<f64> {
     let [wanted, set, is] =
         ["wanted_velocity_m_per_s", "set_position_m", "position_m"].map(|name| table.numbers(name));

@@ -1,4 +1,4 @@
-//! Sealed rigs: what a sealed file switches on stands in truth.csv, and nothing else that leaves a run tells it.
+//! Sealed rigs: what a sealed file switches on stands in truth.csv, and nothing else that leaves a run reveals it.
 //!
 //! Each run with a sealed file is held against one with an empty one: a word that is a key of the rig file as well, as
 //! `gap_mm`, may stand where it stood before, and nowhere besides.
@@ -60,7 +60,7 @@ fn outputs(run: &SealedRun) -> BTreeMap<String, String> {
             }
             let name = path.strip_prefix(&root).expect("below the run's folder").display().to_string();
             let bytes = fs::read(&path).expect("a file of the run");
-            // The path of the file tells too: a name could be in it.
+            // The path of the file would reveal it too: a name could be in it.
             texts.insert(name.clone(), format!("{name}\n{}", String::from_utf8_lossy(&bytes)));
         }
     }
@@ -162,7 +162,7 @@ fn twenty_sealed_runs_tell_what_is_sealed_in_truth_csv_alone() {
         assert_eq!(frames(&sealed), frames(&open), "{what}");
         assert_eq!(columns(&sealed, "measurement.csv"), columns(&open, "measurement.csv"));
         assert_eq!(json(&sealed.path("run.json"))["sealed"], true);
-        // The one place that tells, and an effect that acts: else the test would be of nothing.
+        // The one place that reveals it, and an effect that acts: else the test would be of nothing.
         let head = columns(&sealed, "truth.csv").join(",");
         for effect in &effects {
             assert!(head.contains(&effect.name.replace('-', "_")), "{what}: {head}");

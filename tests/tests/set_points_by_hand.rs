@@ -15,7 +15,7 @@ fn experiment(drive: &str, load: &str) -> String {
     )
 }
 
-/// Runs it in lockstep with a person who asks once, a tenth of a second into the experiment, and tells the positions
+/// Runs it in lockstep with a person who asks once, a tenth of a second into the experiment, and returns the positions
 /// that the drive was asked for, m, and the forces that the load was asked for, N.
 fn led(experiment: &str, asks: &[HandSetPoint]) -> [Vec<f64>; 2] {
     let scene = Scene::new(experiment);

@@ -1,4 +1,4 @@
-//! `bench watch` as programs see it: what it tells of a run, whom it obeys, and that nobody who looks on costs the run anything.
+//! `bench watch` as programs see it: what it shows of a run, whom it obeys, and that nobody who looks on costs the run anything.
 
 use rustix::process::Signal;
 use serde_json::{Value, json as value};

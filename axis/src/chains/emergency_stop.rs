@@ -12,7 +12,7 @@
 //!     └────────────────────────────────────────────────────────── by itself, or the run ends ──────────────────┘
 //! ```
 //!
-//! The valve is shut in every state but ready, in the cycle that tells of the trip. A controller with a fault holds a stop of
+//! The valve is shut in every state but ready, in the cycle that reports the trip. A controller with a fault holds a stop of
 //! its own: it sends its EmergencyStop frame in that cycle and every 100 ms after, until a person has acknowledged it, and
 //! withdraws it with one frame.
 //!

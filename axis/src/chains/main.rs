@@ -20,10 +20,10 @@
 //!
 //! | what | where | after |
 //! |---|---|---|
-//! | emergency stop, console's abort, a fault of this axis | any | in the cycle that tells |
-//! | partner aborted or in fault | between waiting for the rig and done | in the cycle that tells; 100 cycles after a (re)start |
+//! | emergency stop, console's abort, a fault of this axis | any | in the reporting cycle |
+//! | partner aborted or in fault | between waiting for the rig and done | in the reporting cycle; 100 cycles after a (re)start |
 //! | partner silent | initial positioning to final settling | 100 cycles after its last status |
-//! | partner began anew | initial positioning to final settling | in the cycle that tells |
+//! | partner began anew | initial positioning to final settling | in the reporting cycle |
 //! | condition not met | preparing, settling, final settling | `settling_timeout_s` beyond the state's own length |
 //! | partner not OK, condition met | initial positioning to final settling | the same beyond the longer length, and 0.1 s |
 //! | partner never heard at the start | waiting for the rig | 10 s after this axis's sensors |

@@ -78,7 +78,7 @@ pub(super) enum Gaps {
         /// Counter of the first command received; a sender starts with 1.
         first: u8,
         last: u8,
-        /// Times that a command expired, came too late, or its counter jumped: four bits cannot tell how many were lost there.
+        /// Times that a command expired, came too late, or its counter jumped: four bits do not show how many were lost there.
         pauses: u64,
     },
     /// A controller, for the sensors of its axis, by the rig's ticks.

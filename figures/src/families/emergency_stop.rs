@@ -1,6 +1,6 @@
 //! The first emergency stop of a run: way and time to standstill, the air in the chambers while they are shut, and the way back.
 //!
-//! The supply tells all of it: it falls from the trip on, the check valves shut below their pilot pressure, and it rises again
+//! The supply shows all of it: it falls from the trip on, the check valves shut below their pilot pressure, and it rises again
 //! from the release on. Source: rig-model.md, Emergency stop.
 
 use super::{Family, Figures};

@@ -65,7 +65,7 @@ impl HeldColumns {
         self.set_held(lane, &self.held(of));
     }
 
-    /// The laws of one lane. `like` is any integrator: it tells which number follows which.
+    /// The laws of one lane. `like` is any integrator: it fixes the order of the numbers.
     #[inline(always)]
     pub(super) fn laws(&self, lane: usize, like: &Integrator) -> Integrator<Plain> {
         like.formed(&mut Reading { columns: &self.constants, lane, next: 0 })

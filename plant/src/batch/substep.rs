@@ -60,7 +60,7 @@ impl Registers {
     }
 }
 
-/// A substep of all lanes from `from` to `to`; `like` tells how an integrator is laid out.
+/// A substep of all lanes from `from` to `to`; `like` fixes the layout of an integrator.
 ///
 /// # Panics
 /// Never: the registers must be there, which whoever chose them has asserted.

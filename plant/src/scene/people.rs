@@ -105,7 +105,7 @@ impl People {
         People { script: Script::new(scene), holders: StopHolders::default(), linking_until: None, triggers }
     }
 
-    /// Does what is due in `cycle` to the plant, tells what came of it, and gives the scripted hands' forces over the
+    /// Does what is due in `cycle` to the plant, reports the outcome, and gives the scripted hands' forces over the
     /// cycle. To be called before the sensors are sampled, which then see these forces.
     pub fn begin_cycle(
         &mut self,
@@ -141,7 +141,7 @@ impl People {
         self.script.hands(cycle, plant)
     }
 
-    /// Does one action to the plant and tells what came of it; the emergency stop is the rig's own.
+    /// Does one action to the plant and returns the outcome; the emergency stop is the rig's own.
     pub fn act(&mut self, action: Action, plant: &mut Plant, mut tell: impl FnMut(Outcome)) {
         match action {
             Action::EmergencyStop => {
@@ -171,7 +171,7 @@ impl People {
         }
     }
 
-    /// Takes note of a stop or a release by one of those who can; tells what changed at the plant.
+    /// Takes note of a stop or a release by one of those who can; returns what changed at the plant.
     pub fn emergency_stop(
         &mut self,
         holder: StopHolder,

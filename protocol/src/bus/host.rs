@@ -177,7 +177,7 @@ impl Host {
             if events.iter().any(|event| event.data.u64() == LISTENER) {
                 self.let_in();
             }
-            // What arrived before that moment is in a queue by now: asked again, epoll tells all of them.
+            // What arrived before that moment is in a queue by now: asked again, epoll reports all of them.
             events = wait(&self.epoll, &mut room, NO_WAIT)?;
         }
         for event in events {
@@ -259,7 +259,7 @@ impl Host {
         self.report.peers.push(PeerReport { name: process, before_it_came, ..PeerReport::default() });
     }
 
-    /// Takes what a peer sent: one batch, then the next peer has its turn, and epoll tells again while more waits. For a wire in
+    /// Takes what a peer sent: one batch, then the next peer has its turn, and epoll reports again while more waits. For a wire in
     /// real time all that arrived before `wire_to_ns`. False when nothing more waits.
     fn take_from(&mut self, id: PeerId, wire_to_ns: Option<u64>) -> bool {
         // All queues were read up to where the wire's time stands.
@@ -301,7 +301,7 @@ impl Host {
             let report = &mut self.report.peers[peer.report];
             report.frames_received += 1;
             report.received_by_id.count(&frame);
-            // An error frame is none on the wire: it tells of one, and passes by.
+            // An error frame is none on the wire: it reports one, and passes by.
             let on_wire = frame.raw_id() & ERROR_FLAG == 0;
             match (&mut self.barrier, &mut self.timed) {
                 (Some(barrier), _) => barrier.post(id, frame),
@@ -443,7 +443,7 @@ impl Host {
     }
 }
 
-/// An epoll set that tells of new peers: of each once, so that one who cannot be let in does not keep the host turning. And of
+/// An epoll set that reports new peers: of each once, so that one who cannot be let in does not keep the host turning. And of
 /// the timer of a wire that keeps time.
 fn listening(socket_file: &SocketFile, timed: Option<&TimedWire>) -> io::Result<OwnedFd> {
     let epoll = epoll::create(epoll::CreateFlags::CLOEXEC)?;

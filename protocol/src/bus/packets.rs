@@ -30,7 +30,7 @@ pub(super) struct Packet {
     pub(super) len: usize,
     /// When the packet arrived, in ns of the clock that [`Inbox::fill`] was given.
     pub(super) stamp_ns: u64,
-    /// Packets dropped at this socket's queue so far, modulo 2^32; only SocketCAN tells.
+    /// Packets dropped at this socket's queue so far, modulo 2^32; only SocketCAN reports it.
     pub(super) overflow: Option<u32>,
     /// Whether we sent this packet ourselves.
     pub(super) sent_here: bool,
@@ -89,7 +89,7 @@ impl Inbox {
         self.count < BATCH
     }
 
-    /// Receives the next batch; what was not taken of the last one is gone. `clock` tells the time of what happened so many
+    /// Receives the next batch; what was not taken of the last one is gone. `clock` gives the time of what happened so many
     /// ns ago.
     ///
     /// # Errors
@@ -129,7 +129,7 @@ impl Inbox {
         };
         let began_ns = ns_of(ClockId::Monotonic);
         let mut count = take();
-        // The kernel tells first, and once, that the other end closed with packets unread; what it had sent comes after.
+        // The kernel reports first, and once, that the other end closed with packets unread; what it had sent comes after.
         if count < 0 && io::Error::last_os_error().raw_os_error() == Some(libc::ECONNRESET) {
             count = take();
         }
@@ -153,7 +153,7 @@ impl Inbox {
     }
 }
 
-/// Notes what the kernel said of one received packet, whose bytes are in place; tells its stamp of the wall clock.
+/// Notes what the kernel said of one received packet, whose bytes are in place; returns its stamp of the wall clock.
 ///
 /// # Safety
 /// `header` was filled by `recvmmsg`, and its control buffer is alive.

@@ -262,7 +262,7 @@ impl fmt::Display for TooSlow {
 /// Holds a bit rate against what `rig.dbc` sends in cycles: load, and deadlines.
 ///
 /// # Errors
-/// [`TooSlow`], which tells the arithmetic.
+/// [`TooSlow`], which shows the arithmetic.
 pub fn check(bits_per_s: u32) -> Result<(), TooSlow> {
     let analysis = RigAnalysis::worst_case(bits_per_s);
     if load_ppm_at(bits_per_s) <= LOAD_LIMIT_PPM && analysis.late() == 0 {

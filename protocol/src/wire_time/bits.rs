@@ -81,7 +81,7 @@ pub fn sequence(frame: &CanFrame) -> BitSequence {
         bits.push(raw_id, 18);
         bits.push(remote << 2, 3);
     }
-    // A request tells how much it asks for and carries nothing.
+    // A request says how much it asks for and carries nothing.
     bits.push(frame.data().len() as u32, 4);
     if remote == 0 {
         frame.data().iter().for_each(|byte| bits.push(u32::from(*byte), 8));

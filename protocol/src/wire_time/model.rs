@@ -259,7 +259,7 @@ impl WireModel {
         }
     }
 
-    /// Error counters of all: `sender` for the one, `others` for the rest. Tells what it made of the sender.
+    /// Error counters of all: `sender` for the one, `others` for the rest. Returns the new state of the sender.
     fn confine(
         &mut self,
         from: NodeId,

@@ -35,7 +35,7 @@ fn the_host_counts_malformed_packets_and_passes_none_on() {
 fn a_packet_without_bytes_ends_its_senders_connection_and_no_other() {
     let (place, host, [mut one, mut two]) = served();
     let client = raw_client(&place.socket());
-    // A socket cannot tell it from a peer that closed.
+    // A socket cannot distinguish it from a peer that closed.
     send_raw(&client, &[]);
     let mut bytes = [0_u8; 16];
     assert_eq!(rustix::net::recv(&client, &mut bytes, rustix::net::RecvFlags::empty()).unwrap().0, 0);

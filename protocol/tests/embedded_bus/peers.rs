@@ -191,7 +191,7 @@ fn what_a_host_delivered_before_it_went_can_still_be_read() {
     wait_until_down(reader.as_mut());
 }
 
-/// The kernel tells of a connection that was closed with unread packets before it hands out what came over it. A peer that
+/// The kernel reports a connection that was closed with unread packets before it hands out what came over it. A peer that
 /// took this for the end once lost the rig's farewell to a host that stopped while a command was under way.
 #[test]
 fn what_a_host_sent_is_read_even_if_it_died_with_packets_unread() {

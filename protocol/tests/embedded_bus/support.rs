@@ -15,9 +15,9 @@ use std::time::{Duration, Instant};
 pub(crate) const LIMIT: Duration = Duration::from_secs(30);
 /// Frames that fit each queue even where the kernel grants no more than its default of 208 KiB, some 750 bytes each.
 pub(crate) const FITS_ANY_QUEUE: usize = 200;
-/// Frames on this identifier only tell that somebody is there; [`frames_until`] leaves them out.
+/// Frames on this identifier only show that somebody is there; [`frames_until`] leaves them out.
 pub(crate) const HELLO_ID: u16 = 0x7FF;
-/// Frames on this identifier tell that everything sent before has passed.
+/// Frames on this identifier show that everything sent before has passed.
 pub(crate) const FENCE_ID: u16 = 0x7FE;
 
 /// A folder with a socket path in it; the folder goes with the value.
@@ -222,7 +222,7 @@ pub(crate) fn send_fence(peer: &mut dyn Bus) {
     peer.send(&CanFrame::new(FENCE_ID, &[])).expect("a connected peer sends");
 }
 
-/// A frame that tells its number.
+/// A frame that carries its number.
 pub(crate) fn numbered(id: u16, number: usize) -> CanFrame {
     CanFrame::new(id, &(number as u64).to_le_bytes())
 }

@@ -242,7 +242,7 @@ const DIMENSIONLESS: &str = include_str!("dimensionless.txt");
 /// A public number says its unit in its name.
 pub(super) const UNITS_IN_NAMES: Rule = Rule {
     name: "units",
-    // Names on the command line are words of its users; its help tells the unit.
+    // Names on the command line are words of its users; its help states the unit.
     applies: |path| is_rust(path) && path.contains("/src/") && !path.ends_with("/cli.rs"),
     check: |file| {
         file.each_line(|line| {
