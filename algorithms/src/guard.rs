@@ -21,12 +21,12 @@ use std::time::{Duration, Instant as WallInstant};
 /// One step longer than this is a fault: 20 cycles, after which the rig itself calls commands stale.
 pub const LONGEST_ONCE: Duration = Duration::from_millis(20);
 /// Steps longer than this, the basic cycle, are a fault when they come [`SUCCESSIVE`] running.
-pub const LONGEST_EACH: Duration = Duration::from_millis(1);
+const LONGEST_EACH: Duration = Duration::from_millis(1);
 /// How many successive steps over [`LONGEST_EACH`] are a fault.
-pub const SUCCESSIVE: u32 = 10;
+const SUCCESSIVE: u32 = 10;
 
 /// Wall time in one call after which an algorithm counts as hung.
-pub const HANG_LIMIT: Duration = Duration::from_secs(2);
+const HANG_LIMIT: Duration = Duration::from_secs(2);
 
 /// Calls of algorithms begun and ended in this process: odd while one is being called. All are called by one thread.
 static CALLS: AtomicU64 = AtomicU64::new(0);

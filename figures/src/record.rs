@@ -174,7 +174,7 @@ pub fn common(these: &[Span], those: &[Span]) -> Vec<Span> {
 
 /// A jump of a set-point between two values at which it stays.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Step {
+pub(crate) struct Step {
     /// First instant of the new value, s.
     pub at_s: f64,
     /// Value before it, in the set-point's unit.
@@ -187,7 +187,7 @@ pub struct Step {
 
 impl Step {
     /// Value after the step less value before it.
-    pub fn height_value(&self) -> f64 {
+    pub(crate) fn height_value(&self) -> f64 {
         self.after_value - self.before_value
     }
 }
@@ -197,7 +197,7 @@ const STAYS_S: f64 = 0.05;
 
 /// The largest jump of `set_point` within `spans` of at least `least_value`; the first of equals. The values that it leaves
 /// and takes last at least 50 ms each, so that ramps, sines and loads that follow the motion have none.
-pub fn largest_step(set_point: &Series, spans: &[Span], least_value: f64) -> Option<Step> {
+pub(crate) fn largest_step(set_point: &Series, spans: &[Span], least_value: f64) -> Option<Step> {
     let stretches = set_point.constant_stretches();
     let long = |span: &Span| span.length_s() > STAYS_S;
     let neighbours = stretches.windows(2).filter(|pair| long(&pair[0]) && long(&pair[1]));

@@ -51,7 +51,7 @@ impl Scale {
     }
 
     /// Values between the powers of ten, for faint lines.
-    pub fn between_decades(&self) -> Vec<f64> {
+    fn between_decades(&self) -> Vec<f64> {
         let (low, high) = self.values;
         let powers = low.log10().floor() as i32..=high.log10().floor() as i32;
         let steps = powers.flat_map(|power| (2..10).map(move |step| f64::from(step) * 10f64.powi(power)));

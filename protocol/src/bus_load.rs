@@ -20,19 +20,19 @@ use std::fmt;
 use crate::frames::{BIT_RATE_PER_S, MESSAGES, MessageSpec};
 
 /// Highest share of the bus that cyclic frames and reserve may take, in parts per million.
-pub const LOAD_LIMIT_PPM: u64 = 700_000;
+pub(crate) const LOAD_LIMIT_PPM: u64 = 700_000;
 
 /// Cyclic load with reserve, in parts per million of the bus.
-pub const LOAD_PPM: u64 = load_ppm_at(BIT_RATE_PER_S);
+const LOAD_PPM: u64 = load_ppm_at(BIT_RATE_PER_S);
 
 /// Worst-case bits of the DAQ frame that is held in reserve each millisecond.
-pub const RESERVE_BITS: u32 = worst_case_bits(8);
+pub(crate) const RESERVE_BITS: u32 = worst_case_bits(8);
 
 /// Worst-case bits when every cyclic frame, and the reserve, falls into the same millisecond.
-pub const FULLEST_MILLISECOND_BITS: u32 = sum_of_cyclic_bits(u32::MAX) + RESERVE_BITS;
+const FULLEST_MILLISECOND_BITS: u32 = sum_of_cyclic_bits(u32::MAX) + RESERVE_BITS;
 
 /// Milliseconds, the fullest one included, until everything of it was sent.
-pub const BACKLOG_MS: u32 = backlog_ms();
+const BACKLOG_MS: u32 = backlog_ms();
 
 /// Capacity of the bus in one millisecond, bits.
 const BITS_PER_MS: u32 = BIT_RATE_PER_S / 1000;
@@ -82,14 +82,12 @@ const fn bits_down_to_fastest() -> u32 {
 }
 
 /// Share of a bus of `bits_per_s` that a frame of so many bits takes each period, in parts per million.
-#[must_use]
-pub const fn share_ppm_at(bits: u32, period_ms: u32, bits_per_s: u32) -> u64 {
+pub(crate) const fn share_ppm_at(bits: u32, period_ms: u32, bits_per_s: u32) -> u64 {
     (bits as u64 * 1_000_000_000).div_ceil(period_ms as u64 * bits_per_s as u64)
 }
 
 /// Cyclic load with reserve at `bits_per_s`, in parts per million of the bus.
-#[must_use]
-pub const fn load_ppm_at(bits_per_s: u32) -> u64 {
+pub(crate) const fn load_ppm_at(bits_per_s: u32) -> u64 {
     let (mut ppm, mut index) = (share_ppm_at(RESERVE_BITS, 1, bits_per_s), 0);
     while index < MESSAGES.len() {
         let message = MESSAGES[index];

@@ -97,7 +97,7 @@ impl Channel {
     }
 
     /// The channel that a mapping calls so.
-    pub fn of_mapping(name: &str) -> Option<Channel> {
+    pub(crate) fn of_mapping(name: &str) -> Option<Channel> {
         Self::ALL.into_iter().find(|channel| channel.to_string() == name)
     }
 

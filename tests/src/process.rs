@@ -124,7 +124,7 @@ impl Running {
 
     /// Waits without polling, which would disturb runs in real time beside it. A program hangs that has written nothing in a
     /// whole `limit`, or has not ended after [`LIMITS_WHILE_IT_WRITES`].
-    pub fn wait_within(mut self, limit: Duration) -> CompletedProcess {
+    pub(crate) fn wait_within(mut self, limit: Duration) -> CompletedProcess {
         let last = Instant::now() + limit * LIMITS_WHILE_IT_WRITES;
         let (mut until, mut previous_bytes) = (Instant::now() + limit, self.output_bytes());
         // Whoever waited for a word may have met its end, and then there is no process any more.

@@ -45,7 +45,7 @@ pub(super) const FAMILY: Family = Family {
 };
 
 /// When the first emergency stop of the run was tripped.
-pub fn first_trip_s(record: &Record) -> Option<f64> {
+pub(crate) fn first_trip_s(record: &Record) -> Option<f64> {
     Some(trip_s(record.truth.numbers("supply_pressure_Pa"), first_shut(record)?.from_s))
 }
 
