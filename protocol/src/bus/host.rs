@@ -259,7 +259,7 @@ impl Host {
         self.report.peers.push(PeerReport { name: process, before_it_came, ..PeerReport::default() });
     }
 
-    /// Takes what a peer sent: one batch, then the next peer has its turn, and epoll reports again while more waits. For a wire in
+    /// Takes what a peer sent: one batch, then the next peer is served, and epoll reports again while more waits. For a wire in
     /// real time all that arrived before `wire_to_ns`. False when nothing more waits.
     fn take_from(&mut self, id: PeerId, wire_to_ns: Option<u64>) -> bool {
         // All queues were read up to where the wire's time stands.
