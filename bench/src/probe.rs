@@ -26,7 +26,7 @@ mod gaps;
 use crate::say;
 use cli::ProbeArguments;
 use crossbeam_channel::{Receiver, Sender, bounded};
-use gaps::{GapTotal, GapDetector};
+use gaps::{GapDetector, GapTotal};
 use protocol::exit::Exit;
 use realtime::privileges::parse_cpu_list;
 use realtime::signals::Continued;
