@@ -71,7 +71,7 @@ pub struct Experiment {
 /// Repetitions, settling, start and restart of an experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunSection {
-    /// Its numbers.
+    /// Repetitions, and times of settling, s.
     pub(crate) numbers: RunNumbers,
     /// Start condition once both axes have settled.
     pub(crate) start: Start,

@@ -168,8 +168,8 @@ impl<R: SimulatedRig> RigNode<R> {
         self.rig.step(cycle, valve)
     }
 
-    /// Valve openings of both axes, 0 while the emergency stop is tripped. `coming`: commands that the caller has for the next cycle
-    /// already, as the rehearsal; `None`: the command that was latched.
+    /// Valve openings of both axes, 0 while the emergency stop is tripped. `coming`: commands that the caller has for the next
+    /// cycle already, as the rehearsal; `None`: the command that was latched.
     #[must_use]
     pub fn openings(&self, coming: [Option<ValveCommand>; 2]) -> [f64; 2] {
         let stopped = self.rig.condition().emergency_stop;

@@ -17,7 +17,7 @@ const COLUMNS: [&str; 4] = ["cpu", "from_ns", "to_ns", "another_ran"];
 /// A gap on one CPU.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Gap {
-    /// The CPU.
+    /// Number of the CPU, as the kernel counts.
     pub cpu: u64,
     /// Last look before, ns of CLOCK_MONOTONIC.
     pub from_ns: u64,

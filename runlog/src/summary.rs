@@ -87,8 +87,8 @@ pub struct Summary<E = RecordedEvent> {
     pub frames_lost: Option<u64>,
     /// The part of it that the rig missed: commands of both axes.
     pub frames_lost_at_rig: Option<u64>,
-    /// Frames that the rig refused: not as `rig.dbc` says (`frames_ignored.malformed`), or no CAN frame (`bus.malformed`). Those that
-    /// the controllers refused stand in their reports.
+    /// Frames that the rig refused: not as `rig.dbc` says (`frames_ignored.malformed`), or no CAN frame (`bus.malformed`). Those
+    /// that the controllers refused stand in their reports.
     pub frames_malformed: u64,
     /// Commands accepted a cycle or more later than the cycle after the one that they answer.
     pub frames_late: u64,

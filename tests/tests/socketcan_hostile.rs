@@ -48,7 +48,7 @@ fn guests_that_are_stopped_killed_or_flood_do_not_stop_the_rig() {
     controller.interrupt();
     emulator.interrupt();
     let summary = scene.summary();
-    // What the flood cost is reported as a loss at a peer's queue, if it cost anything; the rig's own commands were never disputed.
+    // What the flood cost is reported as a loss at a peer's queue, if it cost anything; the commands were never disputed.
     assert_eq!(count(&summary, "/drive_commands/two_sources"), 0);
     assert_eq!(count(&summary, "/frames_malformed"), 0);
 }
