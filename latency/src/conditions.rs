@@ -76,14 +76,13 @@ fn machine(runs: &[RunFiles]) -> Vec<Fact> {
         }
         if let Some(file) = &run.run {
             let RunFacts { emulator_version, counts_allocations, bus, pace } = &file.facts;
-            let counts_allocations = counts_allocations.map(|counts| counts.to_string());
             for (name, value) in [
                 ("emulator version", emulator_version),
-                ("counts allocations", &counts_allocations),
+                ("counts allocations", counts_allocations),
                 ("bus", bus),
                 ("pace", pace),
             ] {
-                value.iter().for_each(|value| facts.add(name, value));
+                value.iter().for_each(|value| facts.add(name, &text(value)));
             }
         }
         for (process, reported) in
