@@ -78,7 +78,8 @@ impl DumpName {
     pub fn parse(folder: &str) -> Option<Self> {
         let mut parts = folder.rsplitn(3, '-');
         let (trigger, cycle, process) = (parts.next()?, parts.next()?, parts.next()?);
-        Some(Self { process: process.into(), cycle: cycle.parse().ok()?, trigger: trigger.into() })
+        let cycle = cycle.parse().ok().filter(|_| cycle.bytes().all(|byte| byte.is_ascii_digit()))?;
+        Some(Self { process: process.into(), cycle, trigger: trigger.into() })
     }
 }
 
@@ -200,7 +201,7 @@ mod tests {
         assert_eq!(name.to_string(), "controller-drive-0000000042-late");
         assert_eq!(DumpName::parse(&name.to_string()), Some(name));
         assert_eq!(DumpName::parse("emulator-7-late"), Some(event("emulator", 7).name()), "fewer digits");
-        for other in ["notes", "emulator-7", "controller-drive-late", "emulator-x-late"] {
+        for other in ["notes", "emulator-7", "controller-drive-late", "emulator-x-late", "emulator-+7-late"] {
             assert_eq!(DumpName::parse(other), None, "{other}");
         }
     }
@@ -213,9 +214,13 @@ mod tests {
         for process in ["controller", "controller-drive", "emulator"] {
             write(run.path(), &event(process, 7), &[], [], &log).unwrap();
         }
+        fs::create_dir(run.path().join(FOLDER).join("notes")).unwrap();
         clear(run.path(), "controller").unwrap();
-        let left: Vec<_> = list(run.path()).unwrap().into_iter().map(|(folder, _)| folder).collect();
-        assert_eq!(left, ["controller-drive-0000000007-late", "emulator-0000000007-late"]);
+        let entries = fs::read_dir(run.path().join(FOLDER)).unwrap();
+        let mut left: Vec<_> =
+            entries.map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        left.sort();
+        assert_eq!(left, ["controller-drive-0000000007-late", "emulator-0000000007-late", "notes"]);
         remove(run.path(), "emulator-0000000007-late").unwrap();
         remove(run.path(), "emulator-0000000007-late").unwrap();
     }
