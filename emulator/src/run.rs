@@ -104,7 +104,10 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<Exit, RunError> {
     let writer = match checked.and_then(|()| open_folder(arguments, &inputs, &started, console.clone())) {
         Ok(writer) => writer,
         Err(error) => {
-            host.and_then(stop_host);
+            // A panic of the host would hide this error.
+            if let Some(Ok(Err(failure))) = host.map(HostThread::join) {
+                protocol::say!("emulator: the bus host failed: {failure}");
+            }
             return Err(error);
         }
     };
