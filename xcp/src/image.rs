@@ -462,10 +462,10 @@ pub(super) mod tests {
         let mut put = |image: &mut Image, place: usize, value: u32| {
             image.write(CONTROL + place as u32 * WIDE, &value.to_le_bytes(), &mut log)
         };
-        put(&mut image, Controls::length, 4).unwrap();
-        put(&mut image, Controls::pre_trigger, 4).unwrap();
+        put(&mut image, Controls::length_samples, 4).unwrap();
+        put(&mut image, Controls::pre_trigger_samples, 4).unwrap();
         assert_eq!(put(&mut image, Controls::arm, 1), Err(Refusal::Sequence), "no room for the trigger");
-        put(&mut image, Controls::pre_trigger, 1).unwrap();
+        put(&mut image, Controls::pre_trigger_samples, 1).unwrap();
         put(&mut image, Controls::slope, 3).unwrap();
         put(&mut image, Controls::arm, 1).unwrap();
         assert_eq!(read::<4>(&image, CONTROL + Controls::arm as u32 * WIDE), 1_u32.to_le_bytes());

@@ -28,10 +28,10 @@ settings::parameters! {
         source as "trace.source": signal(17.0, "signal that is compared with the threshold, by its place"),
         threshold as "trace.threshold": declare("", [-1e9, 1e9], 0.0, "threshold, in the unit of the source"),
         slope as "trace.slope": declare("", [0.0, 3.0], 0.0, "0 rising, 1 falling, 2 either, 3 at once").whole(),
-        pre_trigger as "trace.pre_trigger_samples": declare("", [0.0, CAPACITY as f64 - 1.0], 100.0,
+        pre_trigger_samples as "trace.pre_trigger_samples": declare("", [0.0, CAPACITY as f64 - 1.0], 100.0,
             "samples before the trigger; below the length").whole(),
-        length as "trace.length_samples": declare("", [1.0, CAPACITY as f64], 1000.0, "samples in all").whole(),
-        sample_time as "trace.sample_time_cycles": declare("cycles", [1.0, 60_000.0], 1.0,
+        length_samples as "trace.length_samples": declare("", [1.0, CAPACITY as f64], 1000.0, "samples in all").whole(),
+        sample_time_cycles as "trace.sample_time_cycles": declare("cycles", [1.0, 60_000.0], 1.0,
             "cycles of 1 ms from sample to sample").whole(),
         channel_1 as "trace.channel_1": signal(1.0, "signal that is recorded, by its place"),
         channel_2 as "trace.channel_2": signal(5.0, "signal that is recorded, by its place"),
@@ -86,9 +86,9 @@ struct Settings {
     source: usize,
     threshold: f64,
     slope: u8,
-    pre_trigger: usize,
-    length: usize,
-    every: u64,
+    pre_trigger_samples: usize,
+    length_samples: usize,
+    sample_time_cycles: u64,
     channels: [usize; CHANNELS],
 }
 
@@ -135,9 +135,9 @@ impl Settings {
             source: controls.source as usize,
             threshold: controls.threshold,
             slope: controls.slope as u8,
-            pre_trigger: controls.pre_trigger as usize,
-            length: controls.length as usize,
-            every: controls.sample_time as u64,
+            pre_trigger_samples: controls.pre_trigger_samples as usize,
+            length_samples: controls.length_samples as usize,
+            sample_time_cycles: controls.sample_time_cycles as u64,
             channels: [channel_1, channel_2, channel_3, channel_4].map(|place| place as usize),
         }
     }
@@ -146,7 +146,7 @@ impl Settings {
 impl Trace {
     /// Whether the pre-trigger is shorter than the buffer.
     pub(crate) fn can_arm(controls: &Controls) -> bool {
-        controls.pre_trigger < controls.length
+        controls.pre_trigger_samples < controls.length_samples
     }
 
     /// Discards all samples and starts with these settings, whose ranges were checked.
@@ -176,18 +176,18 @@ impl Trace {
         if !self.runs() || cycle < self.due {
             return;
         }
-        self.due = cycle + self.settings.every;
+        self.due = cycle + self.settings.sample_time_cycles;
         self.put(cycle, signals);
         let source = signals[self.settings.source];
         let before = self.before.replace(source);
-        if self.state == State::Filling && self.held > self.settings.pre_trigger {
+        if self.state == State::Filling && self.held > self.settings.pre_trigger_samples {
             self.state = State::Armed;
         }
         match self.state {
             State::Armed if self.crosses(before, source) => {
                 (self.trigger_cycle, self.triggers) = (cycle as u32, self.triggers.wrapping_add(1));
-                self.held = self.settings.pre_trigger + 1;
-                self.to_come = self.settings.length - self.held;
+                self.held = self.settings.pre_trigger_samples + 1;
+                self.to_come = self.settings.length_samples - self.held;
                 self.state = if self.to_come == 0 { State::Ready } else { State::Triggered };
             }
             State::Triggered => {
@@ -206,7 +206,7 @@ impl Trace {
             values[self.next] = signals[channel];
         }
         self.next = (self.next + 1) % CAPACITY;
-        self.held = (self.held + 1).min(self.settings.length);
+        self.held = (self.held + 1).min(self.settings.length_samples);
     }
 
     fn crosses(&self, before: Option<f64>, source: f64) -> bool {
@@ -255,7 +255,7 @@ mod tests {
     /// The source is signal 3, and the first channel is that.
     fn controls() -> Controls {
         let places = Controls { source: 3.0, channel_1: 3.0, ..Controls::default() };
-        Controls { pre_trigger: 3.0, length: 8.0, threshold: 50.0, ..places }
+        Controls { pre_trigger_samples: 3.0, length_samples: 8.0, threshold: 50.0, ..places }
     }
 
     fn armed(controls: Controls) -> Trace {
@@ -308,7 +308,7 @@ mod tests {
 
     #[test]
     fn samples_are_so_many_cycles_apart_and_say_what_was_skipped() {
-        let mut trace = armed(Controls { sample_time: 10.0, threshold: 60.0, ..controls() });
+        let mut trace = armed(Controls { sample_time_cycles: 10.0, threshold: 60.0, ..controls() });
         run(&mut trace, (0..200).filter(|cycle| *cycle != 70), |cycle| cycle as f64);
         assert_eq!(cycles(&trace), [30, 40, 50, 60, 71, 81, 91, 101]);
     }
@@ -316,7 +316,12 @@ mod tests {
     #[test]
     fn the_whole_buffer_can_be_used() {
         let most = CAPACITY as f64;
-        let all = Controls { length: most, pre_trigger: most - 1.0, threshold: 9000.0, ..controls() };
+        let all = Controls {
+            length_samples: most,
+            pre_trigger_samples: most - 1.0,
+            threshold: 9000.0,
+            ..controls()
+        };
         let mut trace = armed(all);
         run(&mut trace, 0..9100, |cycle| cycle as f64);
         assert_eq!((trace.state, trace.samples()), (State::Ready, CAPACITY));
@@ -326,7 +331,11 @@ mod tests {
 
     #[test]
     fn a_pre_trigger_as_long_as_the_buffer_cannot_be_armed() {
-        let of = |length, pre_trigger| Controls { length, pre_trigger, ..controls() };
+        let of = |length_samples, pre_trigger_samples| Controls {
+            length_samples,
+            pre_trigger_samples,
+            ..controls()
+        };
         assert!(!Trace::can_arm(&of(100.0, 100.0)));
         assert!(Trace::can_arm(&of(100.0, 99.0)));
     }
