@@ -56,7 +56,7 @@ use crate::parameters::RigParameters;
 use crate::plant::Plant;
 use crate::setup::Setup;
 
-pub use hand::{GuidingArm, Hand, HandAction, HandForces, Part};
+pub use hand::{Guidance, Hand, HandAction, HandForces, Part};
 pub use people::{Outcome, People, Script};
 /// Why the `[rig]` of an experiment is refused: file, line, key, value and what is allowed.
 pub use settings::SettingsError as SceneError;

@@ -1,6 +1,6 @@
 //! People at the rig: what an experiment's `[rig]` may say, and what hands and buttons do to a plant.
 
-use plant::scene::{Action, GuidingArm, HandAction, HandForces, Outcome};
+use plant::scene::{Action, Guidance, HandAction, HandForces, Outcome};
 use plant::{Inputs, People, Plant, RigParameters, Scene, SceneError, State};
 
 fn scene(text: &str) -> Scene {
@@ -76,8 +76,8 @@ fn defaults_of_hands_and_events_are_filled_in() {
          [[rig.event]]\nat_s = 2\ndo = \"weights\"\nadded_mass_kg = 5\n[[rig.event]]\nat_s = 1\ndo = \"link\"\n",
     );
     assert_eq!(read.hand[0].action, HandAction::Push { force_n: 60.0, ramp_s: 0.05 });
-    let HandAction::Guide { arm, .. } = read.hand[1].action else { panic!("{:?}", read.hand[1]) };
-    let GuidingArm { travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } = arm;
+    let HandAction::Guide { guidance, .. } = read.hand[1].action else { panic!("{:?}", read.hand[1]) };
+    let Guidance { travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } = guidance;
     // A hand that is on for half a second travels no longer.
     assert_eq!((travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n), (0.5, 2000.0, 60.0, 150.0));
     assert_eq!(read.event[0].action, Action::Weights { added_mass_kg: 5.0 });
@@ -187,7 +187,7 @@ fn trapped_air_holds_a_part_against_the_hand_at_its_limit() {
     );
     let played = play(&scene, 4000, shut);
     let (state, force) = played.samples[3999];
-    let most_n = GuidingArm::default().most_n;
+    let most_n = Guidance::default().most_n;
     assert_eq!(force.carriage_n, most_n);
     let x_m = state.axes[0].extension_m;
     // Air springs of both chambers, p A^2 / V each: some 4.5 kN/m, against 150 N less friction of 26 N: 28 mm.

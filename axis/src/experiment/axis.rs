@@ -162,7 +162,7 @@ impl AxisExperiment {
         let by_hand;
         let set_points = match quantity {
             Quantity::Position => {
-                if let Some(key) = FORCE_KEYS.iter().find(|key| section.has(key)) {
+                if let Some(key) = force_keys().find(|key| section.has(key)) {
                     let message = format!("{key} is for set-points of force; these are of position");
                     return Err(section.wrong_at(key, &message));
                 }
@@ -216,7 +216,11 @@ impl AxisExperiment {
     }
 }
 
-const FORCE_KEYS: [&str; 4] = ["force_limit_n", "initial_force_n", "initial_ramp_s", "by_hand_rate_n_per_s"];
+/// Keys that only a row of forces has.
+fn force_keys() -> impl Iterator<Item = &'static str> {
+    let numbers = ForceNumbers::TABLE.iter().map(|number| &*number.name);
+    numbers.chain(["initial_force_n", "by_hand_rate_n_per_s"])
+}
 
 fn program(section: &mut Section<'_>) -> Result<ProgramReference, SettingsError> {
     let program = section.needed_text("program", "a name in programs, or a path ending in .toml")?;

@@ -9,7 +9,7 @@ use settings::parameters::Parameter;
 use settings::{Result, Section, Source};
 
 use super::hand::STRONGEST_N;
-use super::{Action, Event, GuidingArm, Hand, HandAction, Part, Scene, cycle_of};
+use super::{Action, Event, Guidance, Hand, HandAction, Part, Scene, cycle_of};
 use crate::parameters::RigParameters;
 
 #[derive(Clone, Copy, PartialEq)]
@@ -95,17 +95,17 @@ fn hand(mut table: Section<'_>, rig: &RigParameters) -> Result<Hand> {
     let guide_to = place("guide_to_m", rig);
     let action = match (table.number(&FORCE)?, table.number(&guide_to)?) {
         (Some(force_n), None) => {
-            let of_a_guide: Vec<&str> = GuidingArm::TABLE.iter().map(|key| &*key.name).collect();
+            let of_a_guide: Vec<&str> = Guidance::TABLE.iter().map(|key| &*key.name).collect();
             none_of(&table, &of_a_guide, "it belongs to a hand with guide_to_m, and this one has force_n")?;
             HandAction::Push { force_n, ramp_s: table.number_or_default(&RAMP)? }
         }
         (None, Some(guide_to_m)) => {
             none_of(&table, &["ramp_s"], "it belongs to a hand with force_n, and this one has guide_to_m")?;
-            let mut arm: GuidingArm = table.parameters()?;
+            let mut guidance: Guidance = table.parameters()?;
             if !table.has("travel_s") {
-                arm.travel_s = arm.travel_s.min(to_s - from_s);
+                guidance.travel_s = guidance.travel_s.min(to_s - from_s);
             }
-            HandAction::Guide { guide_to_m, arm }
+            HandAction::Guide { guide_to_m, guidance }
         }
         _ => {
             let rule = "a hand has one of force_n, guide_to_m: it pushes or it guides";

@@ -25,12 +25,12 @@ use crate::state::Inputs;
 pub(super) const STRONGEST_N: f64 = 2000.0;
 
 settings::parameters! {
-    /// The arm of a guiding hand. Held over a cycle of 1 ms on at least half a kilogram, both ends of the ranges of stiffness and
+    /// How a hand guides. Held over a cycle of 1 ms on at least half a kilogram, both ends of the ranges of stiffness and
     /// damping are stable. All defaults are guesses: some 7 cm of give at the full force, a damping that is little beside the
     /// pistons' own 1100 N s/m, the force of one arm of a standing person.
     #[derive(Serialize)]
-    pub struct GuidingArm {
-        travel_s: declare("s", [0.01, 3600.0], 1.0, "how long a guiding hand travels, or as long as it acts if that is shorter"),
+    pub struct Guidance {
+        travel_s: declare("s", [0.01, 3600.0], 1.0, "how long a guiding hand travels; if absent no longer than it acts"),
         stiffness_n_per_m: declare("N/m", [1.0, 20_000.0], 2000.0, "stiffness of a guiding arm"),
         damping_n_s_per_m: declare("N s/m", [0.0, 500.0], 60.0, "damping of a guiding arm"),
         most_n: declare("N", [1.0, STRONGEST_N], 150.0, "most that a guiding arm pulls to either side"),
@@ -76,9 +76,9 @@ pub enum HandAction {
     Guide {
         /// Where the target ends, m in rig coordinates.
         guide_to_m: f64,
-        /// The arm that pulls it.
+        /// How it is pulled there.
         #[serde(flatten)]
-        arm: GuidingArm,
+        guidance: Guidance,
     },
 }
 
@@ -149,8 +149,8 @@ impl ActiveHand {
                 let nearest_s = since_s.min(left_s);
                 if nearest_s < ramp_s { force_n * (nearest_s / ramp_s) } else { force_n }
             }
-            HandAction::Guide { guide_to_m, arm } => {
-                let GuidingArm { travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } = arm;
+            HandAction::Guide { guide_to_m, guidance } => {
+                let Guidance { travel_s, stiffness_n_per_m, damping_n_s_per_m, most_n } = guidance;
                 let (x_m, v_m_per_s) = self.hand.on.motion(plant);
                 let x_from_m = *self.x_from_m.get_or_insert(x_m);
                 let z = (since_s / travel_s).min(1.0);
