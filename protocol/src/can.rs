@@ -38,7 +38,7 @@ impl CanFrame {
     /// If `id` exceeds 11 bits or `data` 8 bytes: both come from `rig.dbc`, which the generator of the frames checks.
     #[must_use]
     pub fn new(id: u16, data: &[u8]) -> Self {
-        assert!(id < 0x800, "identifier {id:#x} exceeds 11 bits");
+        assert!(u32::from(id) <= STANDARD_MASK, "identifier {id:#x} exceeds 11 bits");
         Self::from_raw(u32::from(id), data)
     }
 
@@ -85,7 +85,7 @@ impl CanFrame {
     /// The 11-bit identifier of a plain data frame; `None` for extended, remote and error frames.
     #[must_use]
     pub fn standard_id(&self) -> Option<u16> {
-        (self.can_id < 0x800).then_some(self.can_id as u16)
+        (self.can_id <= STANDARD_MASK).then_some(self.can_id as u16)
     }
 
     /// The data, 0 to 8 bytes.

@@ -5,7 +5,7 @@
 
 mod reader;
 
-use protocol::can::{CanFrame, ERROR_FLAG, EXTENDED_FLAG, REMOTE_FLAG};
+use protocol::can::{CanFrame, ERROR_FLAG, ERROR_MASK, EXTENDED_FLAG, REMOTE_FLAG, STANDARD_MASK};
 use std::io::{self, Write};
 
 pub use reader::{LogError, LogLine, LogProblem, LogReader, MOST_LINE_BYTES};
@@ -49,7 +49,7 @@ pub struct LineError {
 pub struct Line<'a> {
     /// Name of the interface.
     pub interface: &'a str,
-    /// Identifier of the frame, hexadecimal.
+    /// Identifier as it stands in the line: 3 hexadecimal digits, or 8 for an extended frame and an error frame.
     pub identifier: &'a str,
     /// The frame and its time; ns since the log's epoch.
     pub record: FrameRecord,
@@ -107,10 +107,12 @@ fn read_identifier(id: &str) -> Result<u32, &'static str> {
     let number = u32::from_str_radix(id, 16).ok().filter(|_| is_hex(id));
     let number = number.ok_or("an identifier is hexadecimal")?;
     match id.len() {
-        3 if number < 0x800 => Ok(number),
+        3 if number <= STANDARD_MASK => Ok(number),
         3 => Err("an identifier of 3 digits is at most 7FF"),
         // An error frame brings its flag along.
-        8 if number < 2 * ERROR_FLAG => Ok(if number < ERROR_FLAG { number | EXTENDED_FLAG } else { number }),
+        8 if number <= ERROR_FLAG | ERROR_MASK => {
+            Ok(if number < ERROR_FLAG { number | EXTENDED_FLAG } else { number })
+        }
         8 => Err("an identifier of 8 digits is at most 1FFFFFFF, that of an error frame at most 3FFFFFFF"),
         _ => Err("an identifier has 3 digits, or 8 when it is extended"),
     }
