@@ -186,7 +186,7 @@ fn drive_through(
     Ok(())
 }
 
-// About sixteen courses for each of five programs.
+// About sixteen sequences of inputs for each of five programs.
 proptest! {
     #![proptest_config(ProptestConfig { cases: 80, ..ProptestConfig::default() })]
 
@@ -229,7 +229,7 @@ fn held_at(position_m: f64, from: u64, until: u64) -> Vec<f64> {
 }
 
 #[test]
-fn the_random_courses_reach_control_and_not_only_faults() {
+fn the_random_inputs_reach_control_and_not_only_faults() {
     // The experiment begins with a rest at 0.1 m: with the carriage held there all goes its way, and held away the valve opens.
     let openings = held_at(0.09, 2300, 2600);
     assert!(openings[2310..].iter().all(|opening| *opening > 0.0), "{:?}", &openings[2300..2330]);

@@ -144,7 +144,7 @@ fn an_axis_that_presses_needs_linked_rods_before_and_in_the_experiment() {
     let mut load = controller(Axis::Load, "load-step", true);
     let cycle = run_to(&mut load, MainChainState::Experiment, &linked());
     let answer = step(&mut load, cycle, &sensors(cycle), Some(&apart()));
-    assert!(!answer.command.enable, "shut in the cycle that tells");
+    assert!(!answer.command.enable, "shut in the cycle that reports it");
     assert_eq!(answer.emergency_stop.map(|stop| stop.release), Some(false));
     step(&mut load, cycle + 1, &sensors(cycle), Some(&apart()));
     assert_eq!(load.cause(), MainCause::Fault(Fault::NotLinked));

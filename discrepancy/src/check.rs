@@ -75,7 +75,7 @@ impl Checked {
     }
 }
 
-/// Checks a record against the sensors and limits of a rig file; never fails, [`RecordCheck::usable`] tells.
+/// Checks a record against the sensors and limits of a rig file; never fails: [`RecordCheck::usable`] says whether it is fit.
 pub fn check(record: &Record, rig: &RigParameters) -> Checked {
     let mut notes = Notes::new(record);
     for warning in &record.warnings {

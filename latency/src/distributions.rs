@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 /// Share of one-way latencies that may be below zero before the report says so.
 const BELOW_ZERO_SHARE: f64 = 0.01;
 
-/// The distributions of a run, by tag, the reference's among them; tells what could not be had.
+/// The distributions of a run, by tag, the reference's among them; notes in the run which cannot be had.
 pub(crate) fn of_run(run: &mut RunFiles) -> BTreeMap<String, Series> {
     let mut found = run.logged.clone();
     if run.whole {

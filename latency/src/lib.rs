@@ -79,7 +79,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Events that a report tells.
+/// Events that a report shows.
 const WORST: usize = 10;
 
 /// What keeps a report from being made.

@@ -190,7 +190,7 @@ pub enum Cause {
     /// Nothing that was recorded explains it.
     #[default]
     Unexplained,
-    /// Something was late or missed and nothing of it was recorded, or nothing tells whether anything was.
+    /// Something was late or missed and nothing of it was recorded, or nothing shows whether anything was.
     Unknown,
 }
 

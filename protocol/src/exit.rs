@@ -7,7 +7,7 @@ use std::process::ExitCode;
 pub enum Exit {
     /// All went well.
     Good = 0,
-    /// A bound or threshold was broken.
+    /// A bound, a threshold or a check was broken, or a run ended before it was done.
     BoundBroken = 1,
     /// The command line, an input file or the output folder is not usable.
     BadInput = 2,

@@ -7,7 +7,7 @@
 //! ```
 //! A gap in which another thread ran on that CPU says little. One in which none ran says that the CPU itself stood still: the
 //! host of a virtual machine took it away, or its firmware did. A row without length says that the probe watches that CPU
-//! from there on; older tables have none, and do not tell of a CPU without gaps whether it was watched.
+//! from there on; older tables have none: whether a CPU without gaps was watched is unknown there.
 
 use std::io::{self, Write};
 

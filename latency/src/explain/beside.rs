@@ -36,7 +36,7 @@ fn dump(folder: &Path, process: &str, first: u64, last: u64) -> Option<String> {
     nearest.map(|(dump, _)| format!("{}/{dump}", flight_dump::FOLDER))
 }
 
-/// Frames of a log of candump by identifier; nothing without one.
+/// Frames of a log of candump by identifier; nothing without one. A line that is no classic frame is left out.
 fn frames(log: &Path) -> BTreeMap<String, u64> {
     let text = std::fs::read_to_string(log).unwrap_or_default();
     let mut counts = BTreeMap::new();
