@@ -4,7 +4,6 @@ use figures::SummaryError;
 use figures::join;
 use figures::record::{self, Record};
 use figures::top::TOP;
-use runlog::Axis;
 use runlog::run_folder::{FileError, in_order};
 use std::path::{Path, PathBuf};
 
@@ -36,8 +35,7 @@ pub(crate) struct Run {
 
 impl Run {
     pub(crate) fn title(&self) -> String {
-        let title = self.record.experiment.get("title").and_then(toml::Value::as_str);
-        title.unwrap_or("no experiment").to_owned()
+        self.record.experiment.title().unwrap_or("no experiment").to_owned()
     }
 
     pub(crate) fn figure(&self, name: &str) -> Option<f64> {
@@ -88,8 +86,8 @@ pub(crate) fn rows() -> impl Iterator<Item = (&'static str, &'static str)> {
 /// controllers are compared.
 pub(crate) fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
     let Some((first, others)) = runs.split_first() else { return Ok(()) };
-    let asked_first = demands(&first.record.experiment);
-    match others.iter().find(|other| demands(&other.record.experiment) != asked_first) {
+    let asked_first = first.record.experiment.demands();
+    match others.iter().find(|other| other.record.experiment.demands() != asked_first) {
         None => Ok(()),
         Some(other) => Err(RunsError::DifferentExperiments {
             one: first.folder.clone(),
@@ -98,21 +96,6 @@ pub(crate) fn expect_one_experiment(runs: &[Run]) -> Result<(), RunsError> {
             title_other: other.title(),
         }),
     }
-}
-
-/// The demands of an experiment on the rig: its initial state, its mode, and the set-points of both axes.
-fn demands(experiment: &toml::Table) -> toml::Table {
-    // Without `start`: time begins with the experiment, whatever started it.
-    const NO_DEMANDS: [&str; 3] = ["program", "change", "start"];
-    let mut demands = toml::Table::new();
-    for key in ["rig", "run"].into_iter().chain(Axis::NAMES) {
-        if let Some(table) = experiment.get(key).and_then(toml::Value::as_table) {
-            let kept = table.iter().filter(|(key, _)| !NO_DEMANDS.contains(&key.as_str()));
-            let kept: toml::Table = kept.map(|(key, value)| (key.clone(), value.clone())).collect();
-            demands.insert(key.into(), toml::Value::Table(kept));
-        }
-    }
-    demands
 }
 
 #[cfg(test)]

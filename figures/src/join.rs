@@ -8,6 +8,7 @@
 //! A run has passed when emulator and controllers ended well, the bounds of its experiment were kept, no record was dropped,
 //! and no second rig spoke: what stands against it is listed in `not_passed_because`.
 
+use crate::experiment::Experiment;
 use crate::families::{self, Figures, position};
 use crate::record::{self, Record};
 use crate::reports::{self, ControllerReports};
@@ -62,7 +63,7 @@ pub fn join(folder: &Path) -> Result<Joined, SummaryError> {
     let record = record::read(folder, experiment(&run)?)?;
     make_up_errors(&mut summary, &record);
     add_figures(&mut summary, &families::of(&record));
-    let passed = record.experiment.get("passed").and_then(toml::Value::as_table).cloned().unwrap_or_default();
+    let passed = record.experiment.bounds().unwrap_or_default();
     // `passed` of the emulator speaks of its own end, and is kept apart so that joining again starts from it.
     summary.ended_well = Some(summary.ended_well.or(summary.passed).unwrap_or(false));
     summary.thresholds = thresholds::judge_summary(&passed, &summary)?;
@@ -150,7 +151,7 @@ fn against(summary: &JoinedSummary, is_rehearsal: bool) -> Vec<String> {
 }
 
 /// The experiment that the run used; empty without one.
-pub fn experiment(run: &JoinedRun) -> Result<toml::Table, SummaryError> {
+pub fn experiment(run: &JoinedRun) -> Result<Experiment, SummaryError> {
     let text = run.experiment_toml.as_deref().unwrap_or_default();
     Ok(text.parse().map_err(|error| FileError::read(Path::new("run.json: experiment_toml"), error))?)
 }

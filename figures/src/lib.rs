@@ -6,6 +6,7 @@
 //! | [`tables_read`] | a CSV table as columns of numbers and of states |
 //! | [`reports`] | the controllers' reports, and so which tables are of the run |
 //! | [`record`] | all tables of a run: its moves, rests and steps |
+//! | [`experiment`] | what all of these take of the experiment file |
 //! | [`families`] | the figures, one file for each family |
 //! | [`join`](mod@join) | joins what emulator and controllers left in a run's folder into one summary |
 //! | [`thresholds`] | `[passed]` of the experiment file held against the summary |
@@ -19,6 +20,7 @@
 #![warn(missing_docs)] // an interface of other crates
 
 pub mod drawing;
+pub mod experiment;
 mod families;
 pub mod join;
 pub mod median;

@@ -64,7 +64,7 @@ fn whole(record: &Record) -> Picture {
     let span = record.measured.numbers("drive_position_m").span();
     let range = span.unwrap_or(Span { from_s: 0.0, to_s: 1e-3 });
     Picture {
-        title: text(record, &["title"]).unwrap_or_else(|| "a run".into()),
+        title: record.experiment.title().unwrap_or("a run").to_owned(),
         caption: caption(record),
         time_name: "time, s".into(),
         range,
@@ -89,21 +89,15 @@ fn zoom(whole: &Picture, what: &str, at_s: f64) -> Picture {
     zoom
 }
 
-fn text(record: &Record, path: &[&str]) -> Option<String> {
-    let (last, tables) = path.split_last()?;
-    let table = tables.iter().try_fold(&record.experiment, |table, key| table.get(*key)?.as_table())?;
-    table.get(*last)?.as_str().map(str::to_owned)
-}
-
 /// The programs that the experiment names, each behind its axis.
 pub fn programs(record: &Record) -> Vec<String> {
-    let program = |axis: &str| text(record, &[axis, "program"]).map(|program| format!("{axis}: {program}"));
-    Axis::NAMES.into_iter().filter_map(program).collect()
+    let program = |axis: Axis| Some(format!("{}: {}", axis.name(), record.experiment.program(axis)?));
+    Axis::ALL.into_iter().filter_map(program).collect()
 }
 
 /// The experiment's description of itself, and the programs of both axes.
 fn caption(record: &Record) -> String {
-    let about = text(record, &["about"]);
+    let about = record.experiment.about().map(str::to_owned);
     let programs = programs(record);
     let programs = (!programs.is_empty()).then(|| programs.join("   "));
     about.into_iter().chain(programs).collect::<Vec<_>>().join("\n")

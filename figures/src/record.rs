@@ -5,6 +5,7 @@
 //! figures that would need it.
 
 use crate::SummaryError;
+use crate::experiment::Experiment;
 use crate::reports;
 use crate::series::{Series, Span};
 use crate::tables_read::{self, StateSpan, Table};
@@ -67,12 +68,12 @@ pub struct Record {
     /// What only a simulation knows.
     pub truth: Table,
     /// The experiment file; empty without one.
-    pub experiment: toml::Table,
+    pub experiment: Experiment,
 }
 
 /// Reads the tables of `folder`; of the controllers' those of the axes that the reports name, since another may be of an
 /// earlier run.
-pub fn read(folder: &Path, experiment: toml::Table) -> Result<Record, SummaryError> {
+pub fn read(folder: &Path, experiment: Experiment) -> Result<Record, SummaryError> {
     let table = |name: &str, numbers: &[&'static str], states: &[&'static str]| {
         let path = folder.join(name);
         if path.exists() { tables_read::read(&path, numbers, states) } else { Ok(Table::default()) }
@@ -155,9 +156,7 @@ impl Record {
 
     /// Whether the load's set-point follows from the motion: a spring, a damper, a mass, dry friction.
     pub(crate) fn load_depends_on_state(&self) -> bool {
-        let set_points = self.experiment.get("load").and_then(|load| load.get("set-point"));
-        let laws = set_points.and_then(toml::Value::as_array).into_iter().flatten();
-        laws.filter_map(|segment| segment.get("law")?.as_str()).any(|law| STATE_DEPENDENT.contains(&law))
+        self.experiment.load_laws().any(|law| STATE_DEPENDENT.contains(&law))
     }
 
     /// Whether the load's controller did anything: wanted a force, or opened its valve.

@@ -12,6 +12,7 @@
 //! absence is no proof. Of a figure that each repetition has (`figures_by_repetition`) every value must keep them; the one that
 //! keeps them least is judged.
 
+use crate::experiment::Experiment;
 use crate::top;
 use crate::{SummaryError, families};
 use runlog::run_folder::{FileError, in_order, read_text};
@@ -165,10 +166,8 @@ pub fn check(passed: &toml::Table) -> Result<(), SummaryError> {
 ///
 /// A file that cannot be read, or a bound that makes no sense.
 pub fn check_file(file: &Path) -> Result<(), SummaryError> {
-    let experiment: toml::Table = read_text(file)?.parse().map_err(|error| FileError::read(file, error))?;
-    let passed = experiment.get("passed").map(|passed| passed.as_table().ok_or("[passed] is no table"));
-    let passed = passed.transpose().map_err(|error| FileError::read(file, error))?;
-    passed.map_or(Ok(()), check)
+    let experiment: Experiment = read_text(file)?.parse().map_err(|error| FileError::read(file, error))?;
+    check(&experiment.bounds().map_err(|error| FileError::read(file, error))?)
 }
 
 fn refusal(key: &str, bound: &toml::Value, problem: &str) -> SummaryError {

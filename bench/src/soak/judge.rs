@@ -7,6 +7,7 @@ use super::model::{Check, CheckResult, Figures};
 use super::plan::SegmentSpec;
 use super::segment::{Outcome, SegmentEnd};
 use super::segment_files::{SegmentFiles, counts};
+use figures::experiment::Experiment;
 use figures::thresholds::{self, ByRepetition, FigureValue};
 use figures::top::POSITIONS;
 use runlog::summary::{JudgedBound, ProcessReport};
@@ -191,9 +192,8 @@ fn positions(files: &SegmentFiles, judge: bool) -> Check {
     ];
     let reported = POSITIONS.into_iter().zip(errors_m);
     let measured: BTreeMap<_, _> = reported.filter_map(|(key, error_m)| Some((key, error_m?))).collect();
-    let experiment = files.run.experiment_toml.as_deref().unwrap_or_default().parse::<toml::Table>();
-    let passed =
-        experiment.ok().and_then(|table| table.get("passed")?.as_table().cloned()).unwrap_or_default();
+    let experiment = files.run.experiment_toml.as_deref().unwrap_or_default().parse::<Experiment>();
+    let passed = experiment.unwrap_or_default().bounds().unwrap_or_default();
     let bounds: toml::Table =
         passed.into_iter().filter(|(key, _)| measured.contains_key(key.as_str())).collect();
     if bounds.is_empty() {
