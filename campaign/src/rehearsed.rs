@@ -9,17 +9,17 @@ use crate::inputs::CampaignInputs;
 use crate::outcome::{EndState, Outcome};
 use axis_control::axis::{AxisController, AxisRecord};
 use axis_control::setup::{Inputs, Mode};
-use figures::record::{MEASURED, Record, TRUE};
+use figures::record::{Record, TRUE};
 use figures::series::Series;
 use figures::tables_read::{StateSpan, Table, enter};
 use figures::thresholds::{self, ByRepetition, FigureValue};
 use figures::top::POSITIONS;
 use figures::{self, position, top};
-use plant::tables::{self, CycleRecord};
-use plant::{Axis, Truth};
+use plant::{Axis, CycleRecord, Truth};
 use protocol::frames::MainChainState;
 use protocol::periods::CYCLE_S;
 use rehearsal::{Rehearsal, RehearsalParts, RehearsalRow};
+use runlog::cycle_tables::MEASURED;
 use std::collections::BTreeMap;
 
 /// Rehearses a run of at most `seconds` of the rig's time.
@@ -122,7 +122,6 @@ struct AxisColumns {
 
 impl Columns {
     fn new() -> Self {
-        debug_assert!(tables::measurement_columns().eq(MEASURED.iter().copied()), "one order for both");
         let place = |name: &str| Truth::COLUMNS.iter().position(|column| *column == name);
         let truth = TRUE.iter().filter_map(|name| Some((place(name)?, *name, Series::default())));
         Self {

@@ -14,7 +14,7 @@ use protocol::bus::BusCounters;
 use protocol::exit::Exit;
 use protocol::periods::CYCLE_S;
 use realtime::Interrupt;
-use rehearsal::{PlantTables, Rehearsal};
+use rehearsal::{Rehearsal, cycle_tables};
 use runlog::flight_dump;
 use runlog::process::Process;
 use runlog::run_folder::{
@@ -44,15 +44,16 @@ pub(crate) fn run(arguments: &RehearseArguments) -> Result<Exit, RunError> {
         .map_err(|error| RunError::Output(format!("{}: {error}", out.display())))?;
     end_when_hung();
     let started = Instant::now();
-    let mut files = PlantTables::create(out, &scene, &rehearsal).map_err(RunError::output)?;
+    let mut files = cycle_tables(out, &scene, &rehearsal).map_err(RunError::output)?;
     let mut axes = Tables::create(out, &Axis::ALL).map_err(RunError::output)?;
     let cycles = (arguments.seconds * 1000.0).round() as u64;
     let (mut reported, mut news) = (Vec::new(), Vec::new());
     let mut interrupted = false;
     while rehearsal.cycles() < cycles && !rehearsal.ended() && !interrupted {
         let rehearsed = rehearsal.step(|cycle, outcome| reported.push(event(cycle, outcome)));
+        let cycle = &rehearsed.cycle;
         files
-            .write(&rehearsed.cycle)
+            .write(cycle.cycle, cycle.measured(), cycle.known_to_simulation())
             .and_then(|()| rehearsed.axes.iter().flatten().try_for_each(|record| axes.write(record)))
             .map_err(RunError::output)?;
         for item in rehearsal.take_news() {

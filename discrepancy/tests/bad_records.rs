@@ -4,9 +4,9 @@
 
 use discrepancy::check::{Checked, check};
 use discrepancy::gridded_record::GriddedRecord;
-use plant::tables::{CycleRecord, write_measurement, write_measurement_head};
-use plant::{Axis, Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
+use plant::{Axis, CycleRecord, Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use records::{Channel, ReadOptions, Record, Signal, read};
+use runlog::cycle_tables::{write_measurement, write_measurement_head};
 use std::sync::OnceLock;
 
 const HEAD_LINES: usize = 2;
@@ -56,7 +56,7 @@ fn simulated(rig: &RigParameters, linked: bool, seed: u64) -> Sheet {
             truth: plant.truth(&inputs),
             terms: plant.terms(&inputs),
         };
-        write_measurement(&mut text, &record).unwrap();
+        write_measurement(&mut text, cycle, record.measured()).unwrap();
         plant.step(&inputs);
     }
     let text = String::from_utf8(text).unwrap();

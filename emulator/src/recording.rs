@@ -17,7 +17,7 @@ pub(crate) mod writer;
 use crate::event::Event;
 use crate::exchange::{RoundTrip, TimingRecord};
 use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
-use plant::tables::CycleRecord;
+use plant::CycleRecord;
 use runlog::candump::FrameRecord;
 use std::sync::{Arc, Weak};
 

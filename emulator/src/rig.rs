@@ -4,8 +4,7 @@ use crate::event::{EventKind, of_outcome};
 use crate::faults::mark::Mark;
 use crate::faults::schedule::{FaultSchedule, FaultTargets};
 use plant::scene::{Action, HandForces, RigCall, StopHolder};
-use plant::tables::CycleRecord;
-use plant::{AxisReadings, People, Plant, Sensors};
+use plant::{AxisReadings, CycleRecord, People, Plant, Sensors};
 use rig_node::{HandForceSource, PeopledPlant, RigCondition, SimulatedRig};
 
 /// The plant with people and faults.

@@ -14,7 +14,7 @@ mod viewer;
 
 use crate::console::Console;
 use crate::event::Event;
-use plant::tables::CycleRecord;
+use plant::CycleRecord;
 use protocol::socket_file::{SocketFile, SocketFileError, SocketType};
 use runlog::telemetry::{
     Description, DroppedEvents, EventMessage, Kind, write_cycle, write_description, write_packet,

@@ -10,6 +10,7 @@ use crate::reports;
 use crate::series::{Series, Span};
 use crate::tables_read::{self, StateSpan, Table};
 use runlog::Axis;
+use runlog::cycle_tables::MEASURED;
 use runlog::run_folder::{MEASUREMENT_CSV, TRUTH_CSV, controller_csv};
 use std::path::Path;
 
@@ -28,19 +29,6 @@ pub(crate) const CONTROLLER_NUMBERS: &[&str] = &[
 ];
 /// Chains of a controller's table.
 pub const CHAINS: &[&str] = &["main_chain", "force_chain", "matching_chain", "emergency_stop_chain"];
-/// Columns of `measurement.csv`, those that rig-model.md lists.
-pub const MEASURED: &[&str] = &[
-    "drive_valve",
-    "drive_position_m",
-    "drive_force_N",
-    "drive_pressure_a_Pa",
-    "drive_pressure_b_Pa",
-    "load_valve",
-    "load_position_m",
-    "load_force_N",
-    "load_pressure_a_Pa",
-    "load_pressure_b_Pa",
-];
 /// Columns of `truth.csv` that figures are made of.
 pub const TRUE: &[&str] = &[
     "drive_position_m",
@@ -86,7 +74,7 @@ pub fn read(folder: &Path, experiment: Experiment) -> Result<Record, SummaryErro
     Ok(Record {
         drive: of_axis(Axis::Drive)?,
         load: of_axis(Axis::Load)?,
-        measured: table(MEASUREMENT_CSV, MEASURED, &[])?,
+        measured: table(MEASUREMENT_CSV, &MEASURED, &[])?,
         truth: table(TRUTH_CSV, TRUE, &[])?,
         experiment,
     })

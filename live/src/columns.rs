@@ -5,13 +5,10 @@
 //! truth are empty.
 
 use runlog::Axis;
+use runlog::cycle_tables::{AXIS_COLUMNS, MEASURED};
 use runlog::telemetry::Table;
 use std::sync::LazyLock;
 
-/// Columns of `measurement.csv` for one axis, in its order, that the bus carries too.
-pub(crate) const MEASURED: [&str; 5] = ["valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa"];
-/// Number of measured columns of both axes.
-pub(crate) const MEASURED_COUNT: usize = 2 * MEASURED.len();
 /// Names of the axes, the prefixes of their columns.
 pub(crate) const AXES: [&str; 2] = Axis::NAMES;
 
@@ -65,8 +62,8 @@ fn of_axis(axis: usize) -> Vec<Column> {
     // The load's rod extends in -x: values in rod coordinates change their sign.
     let along_x = [1.0, -1.0][axis];
     let measured = |name: &str| {
-        let place = MEASURED.iter().position(|known| *known == name);
-        Source::Measured(axis * MEASURED.len() + place.expect("a column of the table above"))
+        let place = AXIS_COLUMNS.iter().position(|known| *known == name);
+        Source::Measured(axis * AXIS_COLUMNS.len() + place.expect("a column of each axis"))
     };
     let truth = |names: &[&str], factor: f64| {
         Source::Truth(names.iter().map(|name| format!("{}_{name}", AXES[axis])).collect(), factor)
@@ -99,7 +96,7 @@ fn of_axis(axis: usize) -> Vec<Column> {
 /// Indices of the columns' values in a cycle of the telemetry.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Layout {
-    measured: [Option<usize>; MEASURED_COUNT],
+    measured: [Option<usize>; MEASURED.len()],
     /// For each column that is a sum of columns of the truth, their indices; empty when one is missing.
     truth: Vec<Vec<usize>>,
     supply: Option<usize>,
@@ -111,7 +108,7 @@ impl Layout {
         let described: Vec<_> = described.collect();
         let place = |table: Table, name: &str| described.iter().position(|known| *known == (table, name));
         let measured = std::array::from_fn(|index| {
-            let (axis, column) = (AXES[index / MEASURED.len()], MEASURED[index % MEASURED.len()]);
+            let (axis, column) = (AXES[index / AXIS_COLUMNS.len()], AXIS_COLUMNS[index % AXIS_COLUMNS.len()]);
             place(Table::Measurement, &format!("{axis}_{column}"))
         });
         let truth = COLUMNS.iter().map(|column| match &column.source {
@@ -125,7 +122,7 @@ impl Layout {
     }
 
     /// The measured values of a cycle.
-    pub(crate) fn measured(&self, values: &[f64]) -> [Option<f64>; MEASURED_COUNT] {
+    pub(crate) fn measured(&self, values: &[f64]) -> [Option<f64>; MEASURED.len()] {
         self.measured.map(|place| values.get(place?).copied())
     }
 
@@ -165,8 +162,8 @@ mod tests {
         assert_eq!(layout.truth(friction, -1.0, &[1.0, 2.0, 4.0]), Some(-7.0));
         let without = Layout::new(names[1..].iter().map(|name| (Table::Truth, *name)));
         assert_eq!(without.truth(friction, -1.0, &[1.0, 2.0]), None);
-        assert_eq!(layout.measured(&[1.0; 3]), [None; MEASURED_COUNT]);
+        assert_eq!(layout.measured(&[1.0; 3]), [None; MEASURED.len()]);
         let measured = Layout::new([(Table::Measurement, "load_valve")].into_iter());
-        assert_eq!(measured.measured(&[0.5])[MEASURED.len()], Some(0.5));
+        assert_eq!(measured.measured(&[0.5])[AXIS_COLUMNS.len()], Some(0.5));
     }
 }

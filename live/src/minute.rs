@@ -1,13 +1,13 @@
 //! A record of the last minute: `measurement.csv` and `bus.log` in the formats of a run, which `discrepancy check` reads.
 
-use super::columns::{AXES, MEASURED, MEASURED_COUNT};
 use crate::push_newest;
 use protocol::periods::CYCLE_NS;
 use runlog::candump::{self, FrameRecord};
+use runlog::cycle_tables::{MEASURED, write_measurement, write_measurement_head};
 use runlog::run_folder::{BUS_LOG, LineFile, MEASUREMENT_CSV};
 use runlog::telemetry::SetUp;
 use std::collections::VecDeque;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// Longest record, s.
@@ -20,7 +20,7 @@ const FRAMES_KEPT: usize = 600_000;
 #[derive(Clone, Copy, Debug)]
 struct Measured {
     cycle: u64,
-    values: [f64; MEASURED_COUNT],
+    values: [f64; MEASURED.len()],
 }
 
 #[derive(Debug, Default)]
@@ -45,7 +45,7 @@ pub(crate) struct SavedRecord {
 
 impl RecentRecord {
     /// Adds a cycle; ignored if a measured value is missing.
-    pub(crate) fn cycle(&mut self, cycle: u64, values: [Option<f64>; MEASURED_COUNT]) {
+    pub(crate) fn cycle(&mut self, cycle: u64, values: [Option<f64>; MEASURED.len()]) {
         let reported: Vec<f64> = values.into_iter().flatten().collect();
         if let Ok(values) = reported.try_into() {
             push_newest(&mut self.cycles, CYCLES_KEPT, Measured { cycle, values });
@@ -109,15 +109,9 @@ impl SavedRecord {
         }
         let mut table = LineFile::create(&self.folder.join(MEASUREMENT_CSV))?;
         let SetUp { linked, added_mass_kg } = self.set_up;
-        write!(table.lines(), "# linked={linked} added_mass_kg={added_mass_kg}\ntime_s")?;
-        for axis in AXES {
-            MEASURED.iter().try_for_each(|column| write!(table.lines(), ",{axis}_{column}"))?;
-        }
-        writeln!(table.lines())?;
+        write_measurement_head(table.lines(), linked, added_mass_kg)?;
         for Measured { cycle, values } in &self.cycles {
-            write!(table.lines(), "{}.{:03}", cycle / 1000, cycle % 1000)?;
-            values.iter().try_for_each(|value| write!(table.lines(), ",{value}"))?;
-            writeln!(table.lines())?;
+            write_measurement(table.lines(), *cycle, values.iter().copied())?;
             table.write_when_full()?;
         }
         table.write_out()?;
@@ -136,11 +130,11 @@ mod tests {
     fn minute() -> RecentRecord {
         let mut minute = RecentRecord::default();
         for cycle in 0..3000 {
-            minute.cycle(cycle, [Some(0.25); MEASURED_COUNT]);
+            minute.cycle(cycle, [Some(0.25); MEASURED.len()]);
             let frame = CanFrame::new(0x120, &[0; 8]);
             minute.frame(FrameRecord { stamp_ns: 1_000_000_000 + cycle * 1_000_000, frame });
         }
-        let mut lacking = [Some(0.25); MEASURED_COUNT];
+        let mut lacking = [Some(0.25); MEASURED.len()];
         lacking[3] = None;
         minute.cycle(3000, lacking);
         minute

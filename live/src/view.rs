@@ -1,7 +1,7 @@
 //! The data of the run in progress, from its telemetry and from the bus.
 
 use super::chains;
-use super::columns::{COLUMNS, Column, Layout, MEASURED_COUNT, Source};
+use super::columns::{COLUMNS, Column, Layout, Source};
 use super::light::{ClaimMonitor, Judgement};
 use super::minute::RecentRecord;
 use super::rhythm::LatencyHistograms;
@@ -10,6 +10,7 @@ use super::state::{ActiveFault, Level, Message, State, Timing};
 use super::wire::{Wire, WireEvent};
 use crate::push_newest;
 use runlog::candump::FrameRecord;
+use runlog::cycle_tables::MEASURED;
 use runlog::event::{EventKind, FaultChange};
 use runlog::telemetry::{Description, EventMessage, FaultEntry, Packet, SetUp};
 use serde_json::{Value, json};
@@ -130,7 +131,7 @@ impl View {
     }
 
     /// Adds a row of the charts; `values` are those of the telemetry, none without it.
-    fn add_row(&mut self, cycle: u64, measured: &[Option<f64>; MEASURED_COUNT], values: &[f64]) {
+    fn add_row(&mut self, cycle: u64, measured: &[Option<f64>; MEASURED.len()], values: &[f64]) {
         let on_bus_pa = self.wire.status.map(|status| status.supply_pressure_pa);
         let supply_pa = self.layout.supply_pa(values).or(on_bus_pa);
         let of = |(place, column): (usize, &Column)| match &column.source {

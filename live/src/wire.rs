@@ -1,6 +1,6 @@
 //! The bus as the live page sees it: cycle of the rig, values of the controllers, holders of a stop, bus load.
 
-use super::columns::{AXES, MEASURED, MEASURED_COUNT};
+use super::columns::AXES;
 use super::state::{BusLoad, ChainStates, EmergencyStopState};
 use protocol::bus_load::worst_case_bits;
 use protocol::can::CanFrame;
@@ -9,6 +9,7 @@ use protocol::frames::{
     HandSetPoint, HandSetPointAxis, MESSAGES, RigStatus, Sensors, Tick,
 };
 use runlog::Axis;
+use runlog::cycle_tables::{AXIS_COLUMNS, MEASURED};
 use std::collections::BTreeMap;
 
 /// A node that holds a stop repeats it every 100 ms; after this silence it no longer holds it.
@@ -46,7 +47,7 @@ pub(crate) struct Wire {
     chains: [Option<(u64, ChainStatus)>; 2],
     stops: [Option<u64>; 4],
     /// Newest values of sensors and valves.
-    pub(crate) measured: [Option<f64>; MEASURED_COUNT],
+    pub(crate) measured: [Option<f64>; MEASURED.len()],
     lost: u64,
     malformed: u64,
     frames: Counts,
@@ -96,7 +97,7 @@ impl Wire {
             }
             Frame::LoadValveCommand(command) => {
                 self.echo[1] = Some(command.echo);
-                self.measured[MEASURED.len()] = Some(if command.enable { command.opening } else { 0.0 });
+                self.measured[AXIS_COLUMNS.len()] = Some(if command.enable { command.opening } else { 0.0 });
             }
             Frame::Tick(tick) => return self.tick(&tick),
             Frame::RigStatus(status) => self.status = Some(status),
@@ -131,7 +132,7 @@ impl Wire {
             return;
         }
         let Sensors { position_m, force_n, pressure_a_pa, pressure_b_pa, .. } = *sensors;
-        let first = axis * MEASURED.len();
+        let first = axis * AXIS_COLUMNS.len();
         for (place, value) in [position_m, force_n, pressure_a_pa, pressure_b_pa].into_iter().enumerate() {
             self.measured[first + 1 + place] = Some(value);
         }

@@ -20,7 +20,7 @@
 //! | `sensors.rs` | noise, rounding, saturation |
 //! | `faults.rs` | what is broken, over all of these |
 //! | `effects.rs` | what the baseline leaves out; friction with effects: `effects/friction.rs` |
-//! | `tables.rs` | rows of the measurement file and of the true states |
+//! | `cycle_record.rs` | what is recorded of a cycle |
 //!
 //! [`scene`] is what people do to it: setup, hands, emergency stop, linkage and weights, as an experiment file declares it.
 //!
@@ -47,6 +47,7 @@
 
 mod batch;
 mod chamber;
+mod cycle_record;
 pub mod effects;
 pub mod faults;
 mod integrator;
@@ -60,11 +61,11 @@ mod sensors;
 mod setup;
 mod state;
 mod supply;
-pub mod tables;
 mod truth;
 mod valve;
 
 pub use batch::{Batch, Registers};
+pub use cycle_record::CycleRecord;
 pub use integrator::PERIOD_S;
 pub use parameters::{ParameterError, RigParameters};
 pub use plant::{LinkRefused, Plant};

@@ -2,9 +2,8 @@
 
 use crate::{Rehearsal, RehearsalParts};
 use axis_control::setup::{InputError, Inputs, Mode};
-use plant::tables::{self, CycleRecord};
-use plant::{Axis, Scene, SetupError};
-use runlog::run_folder::{LineFile, MEASUREMENT_CSV, TRUTH_CSV};
+use plant::{Axis, Scene, SetupError, Truth};
+use runlog::cycle_tables::CycleTables;
 use std::io;
 use std::path::Path;
 
@@ -52,39 +51,12 @@ pub fn of_inputs(
     Ok(Rehearsal::new(RehearsalParts { rig: &inputs.rig, scene, seed, controllers })?)
 }
 
-/// `measurement.csv` and `truth.csv` of a rehearsal.
-pub struct PlantTables {
-    measurement: LineFile,
-    truth: LineFile,
-}
-
-impl PlantTables {
-    /// Creates both files in the folder and writes their heads.
-    ///
-    /// # Errors
-    /// The system's, with a file that cannot be created or written.
-    pub fn create(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<Self> {
-        let mut measurement = LineFile::create(&folder.join(MEASUREMENT_CSV))?;
-        let mut truth = LineFile::create(&folder.join(TRUTH_CSV))?;
-        tables::write_measurement_head(measurement.lines(), scene.linked, scene.added_mass_kg)?;
-        tables::write_truth_head(truth.lines(), &rehearsal.plant().term_names())?;
-        Ok(Self { measurement, truth })
-    }
-
-    /// Adds the row of a cycle to each.
-    ///
-    /// # Errors
-    /// The system's: the disk is full.
-    pub fn write(&mut self, cycle: &CycleRecord) -> io::Result<()> {
-        tables::write_measurement(self.measurement.lines(), cycle)?;
-        tables::write_truth(self.truth.lines(), cycle)?;
-        self.measurement.write_when_full()?;
-        self.truth.write_when_full()
-    }
-
-    /// Writes what is still in memory.
-    pub fn write_out(&mut self) -> io::Result<()> {
-        self.measurement.write_out()?;
-        self.truth.write_out()
-    }
+/// `measurement.csv` and `truth.csv` of a rehearsal, with their heads, in the folder.
+///
+/// # Errors
+/// The system's, with a file that cannot be created or written.
+pub fn cycle_tables(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<CycleTables> {
+    let terms = rehearsal.plant().term_names();
+    let truth = Truth::COLUMNS.into_iter().chain(terms.iter().map(String::as_str));
+    CycleTables::create(folder, (scene.linked, scene.added_mass_kg), truth)
 }

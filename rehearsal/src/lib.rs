@@ -15,14 +15,13 @@
 
 mod files;
 
-pub use files::{PlantTables, RehearsalError, of_inputs, scene};
+pub use files::{RehearsalError, cycle_tables, of_inputs, scene};
 
 use axis_control::axis::{AxisController, AxisRecord};
 use axis_control::node::{ControllerNode, NodeEvent, NodeQueues, STOPPED_CYCLES};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use plant::scene::Action;
-use plant::tables::CycleRecord;
-use plant::{Axis, People, Plant, RigParameters, Scene, Sensors, SetupError};
+use plant::{Axis, CycleRecord, People, Plant, RigParameters, Scene, Sensors, SetupError};
 use protocol::bus::{FrameSink, SendError};
 use protocol::can::CanFrame;
 use protocol::frames::{EncodeError, Frame, ValveCommand};

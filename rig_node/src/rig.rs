@@ -1,8 +1,7 @@
 //! The simulated rig that a node moves, and the plant with people around it.
 
 use plant::scene::{Action, HandForces, Outcome, RigCall, StopHolder};
-use plant::tables::CycleRecord;
-use plant::{AxisReadings, Inputs, People, Plant, Sensors};
+use plant::{AxisReadings, CycleRecord, Inputs, People, Plant, Sensors};
 
 /// A rig that is simulated, with what people do to it: what a node moves by one period at a time.
 pub trait SimulatedRig {

@@ -6,6 +6,7 @@
 //! | [`run_folder`], [`process`] | names of files and processes, writing without half a file |
 //! | [`summary`], [`controller_report`], [`conditions`], [`ping_pong`] | the JSON files of a run |
 //! | [`timing`], [`timing_recorder`], [`flight_dump`] | stamps of each cycle, what is recorded of them, the last second |
+//! | [`cycle_tables`] | `measurement.csv` and `truth.csv` |
 //! | [`candump`], [`event`], [`probe`] | `bus.log`; events of a run; gaps of a spinning thread |
 //! | [`telemetry`] | the stream to viewers |
 //! | [`discrepancy_report`] | `report.json` of `discrepancy close` |
@@ -17,6 +18,7 @@ mod axis;
 pub mod candump;
 pub mod conditions;
 pub mod controller_report;
+pub mod cycle_tables;
 pub mod discrepancy_report;
 pub mod event;
 pub mod flight_dump;

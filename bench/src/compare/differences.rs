@@ -7,10 +7,10 @@
 use super::{change, overlay};
 use crate::runs::Run;
 use figures::drawing::{COLOURS, Curve, Panel, Picture};
-use figures::record::MEASURED;
 use figures::series::Series;
 use pagekit::grid::Grid;
 use pagekit::number::in_use;
+use runlog::cycle_tables::MEASURED;
 
 /// Length of the means, s.
 const MEAN_S: f64 = 0.02;

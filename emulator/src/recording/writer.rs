@@ -10,10 +10,11 @@ use crate::event::{Event, EventKind};
 use crate::faults::mark;
 use crate::pace::Shared;
 use crate::telemetry::Telemetry;
-use plant::tables;
+use plant::Truth;
 use realtime::{Clock, MonotonicClock};
 use runlog::candump::{self, FrameRecord};
-use runlog::run_folder::{BUS_LOG, FAULTS_CSV, LineFile, MEASUREMENT_CSV, TRUTH_CSV};
+use runlog::cycle_tables::CycleTables;
+use runlog::run_folder::{BUS_LOG, FAULTS_CSV, LineFile};
 use runlog::telemetry::DroppedEvents;
 use runlog::timing_recorder::TimingSetup;
 use std::collections::HashMap;
@@ -72,8 +73,7 @@ pub(crate) struct WriterReport {
 pub(crate) struct Writer {
     setup: WriterSetup,
     bus_log: LineFile,
-    measurement: LineFile,
-    truth: LineFile,
+    tables: CycleTables,
     faults: Option<LineFile>,
     timing: Option<RigTiming>,
     pending: Vec<FrameRecord>,
@@ -86,10 +86,9 @@ impl Writer {
     /// Opens the files and writes their heads.
     pub(crate) fn create(mut setup: WriterSetup) -> io::Result<Self> {
         let open = |name: &str| LineFile::create(&setup.folder.join(name));
-        let (bus_log, mut measurement, mut truth) =
-            (open(BUS_LOG)?, open(MEASUREMENT_CSV)?, open(TRUTH_CSV)?);
-        tables::write_measurement_head(measurement.lines(), setup.linked, setup.added_mass_kg)?;
-        tables::write_truth_head(truth.lines(), &setup.terms)?;
+        let bus_log = open(BUS_LOG)?;
+        let truth = Truth::COLUMNS.into_iter().chain(setup.terms.iter().map(String::as_str));
+        let tables = CycleTables::create(&setup.folder, (setup.linked, setup.added_mass_kg), truth)?;
         let mut faults = setup.faults.then(|| open(FAULTS_CSV)).transpose()?;
         if let Some(faults) = &mut faults {
             writeln!(faults.lines(), "{}", mark::COLUMNS)?;
@@ -98,8 +97,7 @@ impl Writer {
         Ok(Self {
             setup,
             bus_log,
-            measurement,
-            truth,
+            tables,
             faults,
             timing,
             pending: Vec::new(),
@@ -149,11 +147,8 @@ impl Writer {
             if let Some(telemetry) = &mut self.setup.telemetry {
                 telemetry.cycle(&record);
             }
-            tables::write_measurement(self.measurement.lines(), &record)?;
-            tables::write_truth(self.truth.lines(), &record)?;
             self.report.rows += 1;
-            self.measurement.write_when_full()?;
-            self.truth.write_when_full()?;
+            self.tables.write(record.cycle, record.measured(), record.known_to_simulation())?;
         }
         for record in batch(&records.frames) {
             if let Some(timing) = &mut self.timing {
@@ -245,8 +240,7 @@ impl Writer {
 
     fn flush(&mut self) -> io::Result<()> {
         self.bus_log.write_out()?;
-        self.measurement.write_out()?;
-        self.truth.write_out()?;
+        self.tables.write_out()?;
         self.faults.as_mut().map_or(Ok(()), LineFile::write_out)?;
         self.timing.as_mut().map_or(Ok(()), |timing| timing.recorder.write_out())
     }
@@ -257,9 +251,7 @@ impl Writer {
             "emulator: cannot write to {folder}: {error}; free space or choose another --out, what was written stays"
         );
         // One file failed; the others may still be written.
-        for file in
-            [&mut self.bus_log, &mut self.measurement, &mut self.truth].into_iter().chain(&mut self.faults)
-        {
+        for file in [&mut self.bus_log].into_iter().chain(self.tables.files()).chain(&mut self.faults) {
             let _ = file.write_out();
         }
         shared.output_failed.store(true, Ordering::Relaxed);
@@ -270,9 +262,9 @@ impl Writer {
 mod tests {
     use super::*;
     use crate::recording::queues;
-    use plant::tables::CycleRecord;
-    use plant::{Inputs, Plant, RigParameters, Scene, Sensors};
+    use plant::{CycleRecord, Inputs, Plant, RigParameters, Scene, Sensors};
     use runlog::Axis;
+    use runlog::cycle_tables::MEASURED;
     use std::path::Path;
 
     fn writer_into(folder: &Path) -> Writer {
@@ -281,19 +273,43 @@ mod tests {
         Writer::create(setup).unwrap()
     }
 
-    #[test]
-    fn a_rig_faster_than_the_disk_does_not_keep_its_events_waiting() {
-        const MOST: u64 = 200_000;
+    fn at_start() -> CycleRecord {
         let rig = RigParameters::baseline();
         let plant = Plant::new(&rig, &Scene::default().setup()).unwrap();
-        let inputs = Inputs::default();
-        let record = CycleRecord {
+        let inputs = Inputs { valve: [0.25, -0.5], ..Inputs::default() };
+        CycleRecord {
             cycle: 0,
             valve: inputs.valve,
             readings: Sensors::new(&rig, 1).sample(&plant, &inputs),
             truth: plant.truth(&inputs),
             terms: plant.terms(&inputs),
-        };
+        }
+    }
+
+    #[test]
+    fn each_measured_value_has_its_column() {
+        let record = at_start();
+        assert_eq!(MEASURED.len(), record.measured().count());
+        for (name, value) in MEASURED.into_iter().zip(record.measured()) {
+            let (axis, column) = name.split_once('_').unwrap();
+            let axis = usize::from(axis == Axis::Load.name());
+            let readings = &record.readings[axis];
+            let expected = match column {
+                "valve" => record.valve[axis],
+                "position_m" => readings.position.value,
+                "force_N" => readings.force.value,
+                "pressure_a_Pa" => readings.pressure_a.value,
+                "pressure_b_Pa" => readings.pressure_b.value,
+                _ => panic!("{name} is new"),
+            };
+            assert_eq!(value, expected, "{name}");
+        }
+    }
+
+    #[test]
+    fn a_rig_faster_than_the_disk_does_not_keep_its_events_waiting() {
+        const MOST: u64 = 200_000;
+        let record = at_start();
         let (mut recorder, records) = queues(false);
         let news = recorder.events.clone();
         recorder.event(Event { cycle: 0, kind: EventKind::BusLost });

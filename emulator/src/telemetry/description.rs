@@ -5,7 +5,8 @@
 use crate::cli::RunArguments;
 use crate::faults::listing;
 use crate::inputs::Inputs;
-use plant::{Truth, tables};
+use plant::Truth;
+use runlog::cycle_tables::MEASURED;
 use runlog::run_folder::SCHEMA_VERSION;
 use runlog::telemetry::{Column, Description, DroppedEvents, Experiment, RigFigures, SetUp, Table};
 use settings::unit_of;
@@ -29,7 +30,7 @@ impl RunFacts<'_> {
 
     fn columns(&self) -> Vec<Column> {
         let of = |table, name: &str| Column { table, name: name.to_owned(), unit: unit(name).to_owned() };
-        let measured = tables::measurement_columns().map(|name| of(Table::Measurement, &name));
+        let measured = MEASURED.into_iter().map(|name| of(Table::Measurement, name));
         let truth = Truth::COLUMNS.into_iter().chain(self.terms.iter().map(String::as_str));
         let truth = truth.filter(|_| self.with_truth()).map(|name| of(Table::Truth, name));
         measured.chain(truth).collect()

@@ -5,8 +5,8 @@
 //! fewest digits that read back to the same bits.
 
 use super::{Experiment, MakeError, Recipe, Record, Row, hidden, simulate};
-use plant::tables::AXIS_COLUMNS;
 use plant::{Axis, RigParameters};
+use runlog::cycle_tables::AXIS_COLUMNS;
 use serde_json::{Value, json};
 use std::io::Write as _;
 use std::path::Path;

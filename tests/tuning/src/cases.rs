@@ -4,12 +4,13 @@ use crate::rehearsed::{self, Run};
 use crate::{Trial, TrialError};
 use axis_control::axis::AxisRecord;
 use axis_control::setup::{FileArguments, Inputs};
-use figures::record::{MEASURED, Record};
+use figures::record::Record;
 use figures::series::Series;
 use figures::tables_read::{Table, enter};
 use figures::{self, Figures, position};
 use plant::{Axis, Scene};
 use rehearsal::RehearsalRow;
+use runlog::cycle_tables::MEASURED;
 use std::error::Error;
 use std::path::Path;
 
