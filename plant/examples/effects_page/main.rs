@@ -1,5 +1,5 @@
-//! Makes `docs/effects.md` and its pictures: what each effect of the catalogue is, and what it changes in a step and a slow
-//! stroke.
+//! Makes `docs/effects-responses.md` and its pictures: what each effect of the catalogue is, and what it changes in a step and
+//! a slow stroke.
 //!
 //! `cargo run --release -p plant --example effects_page`
 //!
@@ -25,7 +25,7 @@ const SIGNALS: [&str; 4] = ["p_a/&#963;", "p_b/&#963;", "x/&#963;", "F/&#963;"];
 
 /// What stands above the page's table.
 const HEAD: &str = "\
-# Effects
+# Responses to effects
 
 This page compares each effect of the catalogue, alone on the drive at the geometric middle of the range that sealed rigs
 and studies draw from, with the baseline. Laws, keys and ranges are those of `plant/src/effects/`; the page and its
@@ -89,7 +89,7 @@ fn main() -> std::io::Result<()> {
         "{}\n## Largest differences, in units of noise\n\n{TABLE_HEAD}\n{table}{sections}",
         HEAD.replace("SIGMA", &sigma)
     );
-    fs::write(docs.join("effects.md"), page)
+    fs::write(docs.join("effects-responses.md"), page)
 }
 
 /// What was measured of an effect.
