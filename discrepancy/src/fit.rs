@@ -465,9 +465,10 @@ mod tests {
     fn two_standard_errors_hold_the_truth_however_few_windows_tell() {
         let mut random = Pcg64::seed_from_u64(7);
         let rows = 20;
-        for telling in [4_usize, 40] {
-            let column: Vec<f64> =
-                (0..40 * rows).map(|at| if at < telling * rows { (at as f64).sin() } else { 0.0 }).collect();
+        for informative in [4_usize, 40] {
+            let column: Vec<f64> = (0..40 * rows)
+                .map(|at| if at < informative * rows { (at as f64).sin() } else { 0.0 })
+                .collect();
             let held = (0..400)
                 .filter(|_| {
                     // What hangs together within a window, and no model knows of.
@@ -485,7 +486,7 @@ mod tests {
                     (fit.coefficients[0] - 0.5).abs() <= 2.0 * error
                 })
                 .count();
-            assert!((360..=392).contains(&held), "{telling} windows: {held} of 400");
+            assert!((360..=392).contains(&held), "{informative} windows: {held} of 400");
         }
     }
 }

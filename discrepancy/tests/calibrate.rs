@@ -1,4 +1,4 @@
-//! A record tells the numbers of a rig that nothing is missing from: its volumes and the points of its valve's tables too.
+//! A record determines the numbers of a rig that nothing is missing from: its volumes and the points of its valve's tables too.
 
 use crate::record::gridded;
 use discrepancy::calibrate::finer::{TableCalibration, calibrate_tables};
@@ -43,7 +43,7 @@ fn a_rig_file_with_equal_points_and_a_volume_at_the_end_of_its_range_is_calibrat
         .quantities
         .iter()
         .find(|quantity| quantity.name == "parameter:viscous-friction")
-        .expect("told of");
+        .expect("reported");
     let error = viscous.standard_error.expect("these strokes tell it");
     assert!((viscous.value - 1.3).abs() < 4.0 * error, "{viscous:?}");
     let names: Vec<&str> = found.quantities.iter().map(|quantity| quantity.name.as_str()).collect();
@@ -68,7 +68,7 @@ fn a_record_tells_the_dead_volume_and_the_points_of_the_tables() {
     let found = found(&engine);
 
     let of =
-        |name: &str| found.quantities.iter().find(|quantity| quantity.name == name).expect("it is told of");
+        |name: &str| found.quantities.iter().find(|quantity| quantity.name == name).expect("it is reported");
     for (name, truth) in [
         ("cylinder.dead_volume_cm3", 26.0),
         ("valve.kv_supply_m3_per_h[2]", 0.123),

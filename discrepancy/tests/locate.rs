@@ -18,7 +18,7 @@ fn located(effects: &[Hidden<'_>]) -> (Located, Option<UncataloguedTerm>) {
 
 fn birge_ratio(located: &Located, balance: &str) -> f64 {
     let bar = located.location.balances.iter().find(|bar| bar.balance == balance);
-    bar.unwrap_or_else(|| panic!("{balance} is told")).birge_ratio
+    bar.unwrap_or_else(|| panic!("{balance} is reported")).birge_ratio
 }
 
 #[test]
@@ -42,7 +42,8 @@ fn a_hidden_inclination_lifts_the_force_alone_and_is_a_constant() {
     let outside = outside.expect("something is missing");
     assert_eq!(outside.balance, "drive.force");
     assert_eq!(outside.variables[0].variable, "constant");
-    let force = located.unknowns.iter().find(|series| series.balance == "drive.force").expect("it is told");
+    let force =
+        located.unknowns.iter().find(|series| series.balance == "drive.force").expect("it is reported");
     // Its size: mean of some hundred windows of a newton each.
     let text = outside.formula.expect("a constant is short");
     let value: f64 =

@@ -78,7 +78,7 @@ fn where_nothing_is_hidden_nothing_is_named_and_no_parameter_is_off() {
         assert!((factor - 1.0).abs() < 5.0 * error + 0.003, "parameter {at}: {factor} +- {error}");
     }
     let moved = found.reported.factors.iter().filter(|factor| **factor != 1.0).count();
-    assert!(moved <= 2, "what is told moves parameters that nobody misses: {:?}", found.reported.factors);
+    assert!(moved <= 2, "what is reported moves parameters that nobody misses: {:?}", found.reported.factors);
 
     // A limit is what its name says: half as much again is named, be it noise that set the limit or the least that counts.
     for (effect, place, key) in
@@ -226,7 +226,7 @@ fn what_is_missing_on_the_other_axis_hides_no_effect() {
 
 #[test]
 fn a_smaller_dead_volume_is_no_larger_machine() {
-    // All else larger by as much as the volume is smaller shows the same: only what is believed of masses and areas tells.
+    // All else larger by as much as the volume is smaller shows the same: only the priors of masses and areas differ.
     let found = found(&hiding(&[("dead-volume", "drive", &[("volume_cm3", 16.4)])]), &[]);
     assert_eq!(names(&found), ["dead-volume drive"]);
     for (at, (factor, _)) in factors(&found).into_iter().enumerate() {

@@ -8,7 +8,7 @@ use std::fmt::Write;
 /// Name, place and numbers of an effect.
 pub(crate) type Hidden<'a> = (&'a str, &'a str, &'a [(&'a str, f64)]);
 
-/// The baseline with effects that nobody is told of.
+/// The baseline with hidden effects.
 pub(crate) fn hiding(effects: &[Hidden<'_>]) -> RigParameters {
     effects.iter().fold(RigParameters::baseline(), |rig, (name, place, numbers)| {
         rig.with_effect(name, place, numbers).expect("numbers of the sheet")

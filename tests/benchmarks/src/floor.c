@@ -173,7 +173,7 @@ static int smooth(const struct plant *p, const struct axis *a, const double *u, 
         force[i] = mid[i].force - (a[i].v != 0 ? copysign(r->f_sliding, a[i].v) : 0);
     }
     double d = r->stroke - (a[0].x + a[1].x);
-    double nudged = linked && (a[0].v != 0 || a[1].v != 0) ? 0.5 : 0;
+    double margin = linked && (a[0].v != 0 || a[1].v != 0) ? 0.5 : 0;
     if (linked) {
         double speed = 0, mobility = 0;
         for (int i = 0; i < 2; i++) {
@@ -194,7 +194,7 @@ static int smooth(const struct plant *p, const struct axis *a, const double *u, 
             corner |= out[i].v * a[i].v <= 0 || out[i].x < 0 || out[i].x > r->stroke;
         } else {
             int pressed = (a[i].x <= 0 && total < 0) || (a[i].x >= r->stroke && total > 0);
-            corner |= !pressed && fabs(total) + fabs(mid[i].growth) + nudged > r->f_static;
+            corner |= !pressed && fabs(total) + fabs(mid[i].growth) + margin > r->f_static;
         }
         out[i].s = u[i] + (a[i].s - u[i]) * h->spool_full;
         air(h, a[i].m_a, a[i].q_a, mid[i].edge_a, &out[i].m_a, &out[i].q_a);
