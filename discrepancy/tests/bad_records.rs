@@ -7,6 +7,7 @@ use discrepancy::gridded_record::GriddedRecord;
 use plant::{Axis, CycleRecord, Inputs, Plant, RigParameters, Sensors, Setup, quantise_valve};
 use records::{Channel, ReadOptions, Record, Signal, read};
 use runlog::cycle_tables::{write_measurement, write_measurement_head};
+use runlog::telemetry::SetUp;
 use std::sync::OnceLock;
 
 const HEAD_LINES: usize = 2;
@@ -44,7 +45,7 @@ fn simulated(rig: &RigParameters, linked: bool, seed: u64) -> Sheet {
     let mut plant = Plant::new(rig, &setup).unwrap();
     let mut sensors = Sensors::new(rig, seed);
     let mut text = Vec::new();
-    write_measurement_head(&mut text, linked, 0.0).unwrap();
+    write_measurement_head(&mut text, SetUp { linked, added_mass_kg: 0.0 }).unwrap();
     for cycle in 0..CYCLES {
         let load = if linked { opening(Axis::Load, cycle) } else { 0.0 };
         let valve = [opening(Axis::Drive, cycle), load].map(quantise_valve);

@@ -9,6 +9,7 @@ use crate::faults::script::FaultScript;
 use crate::run::RunError;
 use crate::wire_limits;
 use plant::{Plant, RigParameters, Scene};
+use runlog::telemetry::SetUp;
 use std::path::{Path, PathBuf};
 
 /// The checked inputs.
@@ -28,6 +29,11 @@ pub(crate) struct Inputs {
 }
 
 impl Inputs {
+    /// Set-up of the rig at the start.
+    pub(crate) fn set_up(&self) -> SetUp {
+        SetUp { linked: self.scene.linked, added_mass_kg: self.scene.added_mass_kg }
+    }
+
     /// Reads and checks the files; `sealed` replaces the file that the experiment names.
     pub(crate) fn read(
         rig: &Path,

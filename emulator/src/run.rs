@@ -326,8 +326,7 @@ fn open_folder(
         folder: folder.into(),
         interface: interface.into(),
         epoch_offset_ns: started.epoch_offset_ns,
-        linked: inputs.scene.linked,
-        added_mass_kg: inputs.scene.added_mass_kg,
+        set_up: inputs.set_up(),
         terms,
         faults: can_break(arguments),
         timing: started.unix_s.map(|started_unix_s| TimingSetup {

@@ -108,8 +108,7 @@ impl SavedRecord {
             return Ok(reported);
         }
         let mut table = LineFile::create(&self.folder.join(MEASUREMENT_CSV))?;
-        let SetUp { linked, added_mass_kg } = self.set_up;
-        write_measurement_head(table.lines(), linked, added_mass_kg)?;
+        write_measurement_head(table.lines(), self.set_up)?;
         for Measured { cycle, values } in &self.cycles {
             write_measurement(table.lines(), *cycle, values.iter().copied())?;
             table.write_when_full()?;

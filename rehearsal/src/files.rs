@@ -4,6 +4,7 @@ use crate::{Rehearsal, RehearsalParts};
 use axis_control::setup::{InputError, Inputs, Mode};
 use plant::{Axis, Scene, SetupError, Truth};
 use runlog::cycle_tables::CycleTables;
+use runlog::telemetry::SetUp;
 use std::io;
 use std::path::Path;
 
@@ -58,5 +59,6 @@ pub fn of_inputs(
 pub fn cycle_tables(folder: &Path, scene: &Scene, rehearsal: &Rehearsal) -> io::Result<CycleTables> {
     let terms = rehearsal.plant().term_names();
     let truth = Truth::COLUMNS.into_iter().chain(terms.iter().map(String::as_str));
-    CycleTables::create(folder, (scene.linked, scene.added_mass_kg), truth)
+    let set_up = SetUp { linked: scene.linked, added_mass_kg: scene.added_mass_kg };
+    CycleTables::create(folder, set_up, truth)
 }

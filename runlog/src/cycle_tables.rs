@@ -5,6 +5,7 @@
 //! digits that read back to the same bits. Whoever owns the plant, emulator or rehearsal, writes the same files.
 
 use crate::run_folder::{LineFile, MEASUREMENT_CSV, TRUTH_CSV};
+use crate::telemetry::SetUp;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -24,7 +25,8 @@ measured!("valve", "position_m", "force_N", "pressure_a_Pa", "pressure_b_Pa");
 ///
 /// # Errors
 /// What `out` says.
-pub fn write_measurement_head(out: &mut impl Write, linked: bool, added_mass_kg: f64) -> io::Result<()> {
+pub fn write_measurement_head(out: &mut impl Write, set_up: SetUp) -> io::Result<()> {
+    let SetUp { linked, added_mass_kg } = set_up;
     writeln!(out, "# linked={linked} added_mass_kg={added_mass_kg}\ntime_s,{}", MEASURED.join(","))
 }
 
@@ -67,11 +69,11 @@ impl CycleTables {
     /// The system's, with a file that cannot be created or written.
     pub fn create<'a>(
         folder: &Path,
-        (linked, added_mass_kg): (bool, f64),
+        set_up: SetUp,
         mut truth: impl Iterator<Item = &'a str>,
     ) -> io::Result<Self> {
         let mut measurement = LineFile::create(&folder.join(MEASUREMENT_CSV))?;
-        write_measurement_head(measurement.lines(), linked, added_mass_kg)?;
+        write_measurement_head(measurement.lines(), set_up)?;
         let mut file = LineFile::create(&folder.join(TRUTH_CSV))?;
         write!(file.lines(), "time_s")?;
         truth.try_for_each(|column| write!(file.lines(), ",{column}"))?;

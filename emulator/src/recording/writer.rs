@@ -15,7 +15,7 @@ use realtime::{Clock, MonotonicClock};
 use runlog::candump::{self, FrameRecord};
 use runlog::cycle_tables::CycleTables;
 use runlog::run_folder::{BUS_LOG, FAULTS_CSV, LineFile};
-use runlog::telemetry::DroppedEvents;
+use runlog::telemetry::{DroppedEvents, SetUp};
 use runlog::timing_recorder::TimingSetup;
 use std::collections::HashMap;
 use std::io::{self, Write};
@@ -45,10 +45,8 @@ pub(crate) struct WriterSetup {
     pub interface: String,
     /// Offset from the run's clock to the time stamps of `bus.log`, ns.
     pub epoch_offset_ns: u64,
-    /// Whether the rods are linked at the start, for the comment line of `measurement.csv`.
-    pub linked: bool,
-    /// Added mass on the carriage, kg, for the same line.
-    pub added_mass_kg: f64,
+    /// Set-up at the start, for the comment line of `measurement.csv`.
+    pub set_up: SetUp,
     /// Names of the plant's terms, the last columns of `truth.csv` and of no other file.
     pub terms: Vec<String>,
     /// Whether faults are possible; they have a table then.
@@ -88,7 +86,7 @@ impl Writer {
         let open = |name: &str| LineFile::create(&setup.folder.join(name));
         let bus_log = open(BUS_LOG)?;
         let truth = Truth::COLUMNS.into_iter().chain(setup.terms.iter().map(String::as_str));
-        let tables = CycleTables::create(&setup.folder, (setup.linked, setup.added_mass_kg), truth)?;
+        let tables = CycleTables::create(&setup.folder, setup.set_up, truth)?;
         let mut faults = setup.faults.then(|| open(FAULTS_CSV)).transpose()?;
         if let Some(faults) = &mut faults {
             writeln!(faults.lines(), "{}", mark::COLUMNS)?;

@@ -8,7 +8,7 @@ use crate::inputs::Inputs;
 use plant::Truth;
 use runlog::cycle_tables::MEASURED;
 use runlog::run_folder::SCHEMA_VERSION;
-use runlog::telemetry::{Column, Description, DroppedEvents, Experiment, RigFigures, SetUp, Table};
+use runlog::telemetry::{Column, Description, DroppedEvents, Experiment, RigFigures, Table};
 use settings::unit_of;
 use std::path::Path;
 
@@ -66,7 +66,7 @@ pub(crate) fn description(run: &RunFacts<'_>) -> Description {
             gap_m: inputs.rig.linkage().gap_m,
             force_range_n: inputs.rig.sensors().force_range_n,
         },
-        setup: SetUp { linked: inputs.scene.linked, added_mass_kg: inputs.scene.added_mass_kg },
+        setup: inputs.set_up(),
         faults: listing::faults(),
         dropped_events: DroppedEvents::default(),
     }
